@@ -1,0 +1,47 @@
+"""Contact of a point with a surface: friction, and the relaxed complementarity of force with height and with sliding.
+
+Equation numbers are those of L'Erario et al. 2022. Points [m], forces on the robot [N] and displacements [m] are
+(3, 1) in the world.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as cs
+
+from multimodal_to.adam.spatial import SX
+from multimodal_to.models.terrain import Surface
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactPoint:
+    """A point of the robot that may touch the ground: the origin of `frame`, a corner of `foot`."""
+
+    frame: str
+    foot: str
+
+
+def normal_force(surface: Surface, point: SX, force: SX) -> SX:
+    """Return n(p)ᵀ f [N]."""
+    return cs.dot(surface.normal(point), force)
+
+
+def friction_pyramid(surface: Surface, point: SX, force: SX, friction: float) -> SX:
+    """Return the four distances to the faces of the pyramid [N], (4, 1), none negative inside: μ n·f ∓ t·f (eq. 12).
+
+    All of them together also make the normal force non-negative.
+    """
+    along = surface.tangents(point).T @ force
+    reach = friction * normal_force(surface, point, force)
+    return cs.vertcat(reach - along, reach + along)
+
+
+def complementarity(surface: Surface, point: SX, force: SX) -> SX:
+    """Return d(p) n(p)ᵀ f [N m]: zero when no force acts on a point in the air (eq. 10)."""
+    return surface.distance(point) * normal_force(surface, point, force)
+
+
+def sliding(surface: Surface, point: SX, force: SX, displacement: SX) -> SX:
+    """Return t(p)ᵀ Δp n(p)ᵀ f [N m], (2, 1): zero when a loaded point stays where it is (eq. 11)."""
+    return surface.tangents(point).T @ displacement * normal_force(surface, point, force)

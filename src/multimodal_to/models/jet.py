@@ -1,0 +1,72 @@
+"""Thrust dynamics of a model jet turbine.
+
+Source: G. L'Erario et al., "Modeling, identification and control of model jet engines for jet powered robotics",
+RA-L 2020, equation (8) of L'Erario et al. 2022.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from multimodal_to.adam.spatial import SX
+from multimodal_to.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class JetModel:
+    """Identified coefficients of T̈ = f(T, Ṫ) + g(T, Ṫ) (u + B_UU u²); T in N, time in s, throttle u in %.
+
+    f = K_T T + K_TT T² + K_D Ṫ + K_DD Ṫ² + K_TD T Ṫ + c and g = B_U + B_T T + B_D Ṫ.
+    """
+
+    K_T: float
+    K_TT: float
+    K_D: float
+    K_DD: float
+    K_TD: float
+    B_U: float
+    B_T: float
+    B_D: float
+    B_UU: float
+    c: float
+
+    def acceleration(self, thrust: SX, thrust_rate: SX, throttle: SX) -> SX:
+        """Return T̈ [N/s²]."""
+        drift = (
+            self.K_T * thrust
+            + self.K_TT * thrust**2
+            + self.K_D * thrust_rate
+            + self.K_DD * thrust_rate**2
+            + self.K_TD * thrust * thrust_rate
+            + self.c
+        )
+        gain = self.B_U + self.B_T * thrust + self.B_D * thrust_rate
+        return drift + gain * (throttle + self.B_UU * throttle**2)
+
+    def steady_throttle(self, thrust: float) -> float:
+        """Return the throttle [%] that holds a thrust [N]: T̈ = Ṫ = 0.
+
+        Raises:
+            InputError: no throttle does.
+        """
+        drift = float(self.acceleration(thrust, 0.0, 0.0))
+        gain = self.B_U + self.B_T * thrust
+        roots = np.roots([gain * self.B_UU, gain, drift])
+        real = [float(root.real) for root in roots if abs(root.imag) < 1e-9]
+        if not real:
+            raise InputError(f"no throttle holds a thrust of {thrust} N")
+        return min(real, key=abs)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jet:
+    """A turbine on the robot: a pure force of size T along −z of `frame`, at its origin."""
+
+    name: str
+    frame: str
+    model: JetModel
+    thrust_max: float  # [N]
+    throttle_min: float  # [%]
+    throttle_max: float  # [%]

@@ -1,0 +1,273 @@
+"""`Robot`: a rigid-body tree with contact points and jets, read from a folder with a URDF and a `robot.toml`."""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from multimodal_to.adam import KinDynComputations
+from multimodal_to.errors import ModelError, MultimodalError, unknown
+from multimodal_to.models.contact import ContactPoint
+from multimodal_to.models.jet import Jet, JetModel
+
+Array = NDArray[np.float64]
+
+ROBOT_FILE = "robot.toml"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Posture:
+    """A configuration of the robot: base in the world and joints."""
+
+    base_position: Array  # (3,) [m]
+    base_quaternion_xyzw: Array  # (4,), unit, world-from-base
+    joint_positions: Array  # (n,) [rad or m]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JointLimits:
+    """Ranges to plan in, each (n,) in the order of the joints."""
+
+    lower: Array  # [rad or m]
+    upper: Array  # [rad or m]
+    speed: Array  # [rad/s or m/s]
+    effort: Array  # [N m or N], as the URDF states it
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Robot:
+    """Everything that depends on the robot and not on the task."""
+
+    name: str
+    urdf: Path
+    kindyn: KinDynComputations = field(repr=False)
+    joint_groups: Mapping[str, tuple[str, ...]]
+    joint_limits: JointLimits
+    contacts: tuple[ContactPoint, ...]
+    friction: float
+    jets: tuple[Jet, ...]
+    home: Posture
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Return the joints in the order of s."""
+        return self.kindyn.joint_names
+
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Return the frames of the contact points."""
+        return tuple(contact.frame for contact in self.contacts)
+
+    @property
+    def jet_names(self) -> tuple[str, ...]:
+        """Return the names of the jets."""
+        return tuple(jet.name for jet in self.jets)
+
+    @property
+    def mass(self) -> float:
+        """Return the total mass [kg]."""
+        return self.kindyn.get_total_mass()
+
+    @property
+    def gravity(self) -> Array:
+        """Return the acceleration of free fall in world axes [m/s²], (3,)."""
+        return self.kindyn.gravity
+
+    @property
+    def weight(self) -> float:
+        """Return m |g| [N]."""
+        return self.mass * float(np.linalg.norm(self.gravity))
+
+    def group_indices(self, group: str) -> list[int]:
+        """Return where the joints of a named group stand in s.
+
+        Raises:
+            ModelError: there is no such group.
+        """
+        if group not in self.joint_groups:
+            raise ModelError(unknown("joint group", group, self.joint_groups))
+        return [self.joint_names.index(name) for name in self.joint_groups[group]]
+
+
+def bundled_robots() -> dict[str, Path]:
+    """Return the folders of the robots that come with the library, by name."""
+    package = Path(__file__).parents[1]
+    inside = package / "robots"  # in an installed wheel; a checkout keeps them beside src/
+    folder = inside if inside.is_dir() else package.parents[1] / "robots"
+    return {path.parent.name: path.parent for path in sorted(folder.glob(f"*/{ROBOT_FILE}"))}
+
+
+def load_robot(robot: str | os.PathLike[str]) -> Robot:
+    """Load a bundled robot by name, or any other from its folder.
+
+    Raises:
+        ModelError: there is no such robot, or its files are broken.
+    """
+    bundled = bundled_robots()
+    folder = bundled.get(str(robot), Path(robot))
+    if not folder.is_dir():
+        raise ModelError(f"{unknown('robot', str(robot), bundled)}; nor is there a folder of that name")
+    path = folder / ROBOT_FILE
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ModelError(f"cannot read '{path}': {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ModelError(f"'{path}' is not valid TOML: {error}") from error
+    try:
+        return _robot(_Table(table, "the top level"), folder)
+    except MultimodalError as error:
+        raise ModelError(f"{path}: {error}") from error
+
+
+class _Table:
+    """A TOML table that is read key by key, so that what is missing, mistyped or left over gets named."""
+
+    def __init__(self, content: Mapping[str, Any], where: str) -> None:
+        self._content, self._where, self._read = content, where, set[str]()
+
+    def _take(self, key: str) -> Any:
+        self._read.add(key)
+        if key not in self._content:
+            raise ModelError(f"{self._where} lacks '{key}'")
+        return self._content[key]
+
+    def text(self, key: str) -> str:
+        value = self._take(key)
+        if not isinstance(value, str):
+            raise ModelError(f"'{key}' in {self._where} is {value!r}; expected a text")
+        return value
+
+    def number(self, key: str, default: float | None = None) -> float:
+        if default is not None and key not in self._content:
+            return default
+        value = self._take(key)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise ModelError(f"'{key}' in {self._where} is {value!r}; expected a finite number")
+        return float(value)
+
+    def numbers(self, key: str, count: int) -> Array:
+        value = self._take(key)
+        good = isinstance(value, list) and len(value) == count
+        if not good or not all(isinstance(x, int | float) and math.isfinite(x) for x in value):
+            raise ModelError(f"'{key}' in {self._where} is {value!r}; expected {count} finite numbers")
+        return np.array(value, dtype=float)
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        value = self._take(key)
+        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+            raise ModelError(f"'{key}' in {self._where} is {value!r}; expected a list of names")
+        return tuple(value)
+
+    def table(self, key: str) -> _Table:
+        value = self._take(key)
+        if not isinstance(value, dict):
+            raise ModelError(f"'{key}' in {self._where} is {value!r}; expected a table")
+        return _Table(value, f"[{key}]")
+
+    def tables(self, key: str) -> list[_Table]:
+        value = self._content.get(key, [])
+        self._read.add(key)
+        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+            raise ModelError(f"'{key}' in {self._where} is {value!r}; expected tables, [[{key}]]")
+        return [_Table(item, f"[[{key}]] number {index + 1}") for index, item in enumerate(value)]
+
+    def keys(self) -> list[str]:
+        return list(self._content)
+
+    def done(self) -> None:
+        """Refuse keys that nothing has asked for."""
+        for key in self._content:
+            if key not in self._read:
+                raise ModelError(f"{self._where}: {unknown('key', key, sorted(self._read))}")
+
+
+def _robot(table: _Table, folder: Path) -> Robot:
+    name, urdf = table.text("name"), folder / table.text("urdf")
+    if folder.resolve() not in urdf.resolve().parents:
+        raise ModelError(f"'urdf' is '{urdf}', which is outside the robot's folder")
+    joints = table.table("joints")
+    joint_names = joints.keys()
+    kindyn = KinDynComputations(urdf, joint_names)
+    limits, home_joints = _joints(joints, joint_names, kindyn)
+    groups = table.table("joint_groups")
+    joint_groups = {group: groups.texts(group) for group in groups.keys()}
+    for group, members in joint_groups.items():
+        for member in members:
+            if member not in joint_names:
+                raise ModelError(f"joint group '{group}': {unknown('joint', member, joint_names)}")
+    contact, home = table.table("contact"), table.table("home")
+    friction = contact.number("friction")
+    if friction <= 0:
+        raise ModelError(f"'friction' is {friction}; expected a positive number")
+    feet = contact.table("feet")
+    contacts = tuple(ContactPoint(frame=frame, foot=foot) for foot in feet.keys() for frame in feet.texts(foot))
+    jets = _jets(table)
+    for frame in (*(point.frame for point in contacts), *(jet.frame for jet in jets)):
+        kindyn.tree.frame(frame)
+    quaternion = home.numbers("base_quaternion_xyzw", 4)
+    if abs(np.linalg.norm(quaternion) - 1) > 1e-3:
+        raise ModelError(f"'base_quaternion_xyzw' has the norm {np.linalg.norm(quaternion):.4f}; expected 1")
+    posture = Posture(
+        base_position=home.numbers("base_position", 3),
+        base_quaternion_xyzw=quaternion / np.linalg.norm(quaternion),
+        joint_positions=home_joints,
+    )
+    for part in (contact, home, table):
+        part.done()
+    return Robot(
+        name=name, urdf=urdf, kindyn=kindyn, joint_groups=MappingProxyType(joint_groups), joint_limits=limits,
+        contacts=contacts, friction=friction, jets=jets, home=posture,
+    )  # fmt: skip
+
+
+def _joints(joints: _Table, names: Sequence[str], kindyn: KinDynComputations) -> tuple[JointLimits, Array]:
+    rows = []
+    for name in names:
+        entry = joints.table(name)
+        lower, upper, home = entry.number("lower"), entry.number("upper"), entry.number("home")
+        speed = entry.number("speed")
+        entry.done()
+        if not lower <= home <= upper:
+            raise ModelError(f"joint '{name}': home {home} is not within its range {lower} to {upper}")
+        if speed <= 0:
+            raise ModelError(f"joint '{name}': speed is {speed}; expected a positive number")
+        rows.append((lower, upper, speed, home))
+    columns = np.array(rows, dtype=float).reshape(-1, 4).T
+    effort = np.array([joint.effort for joint in kindyn.tree.joints])
+    return JointLimits(lower=columns[0], upper=columns[1], speed=columns[2], effort=effort), columns[3]
+
+
+def _jets(table: _Table) -> tuple[Jet, ...]:
+    coefficients = tuple(JetModel.__dataclass_fields__)
+    entries = table.tables("jet")
+    models: dict[str, JetModel] = {}
+    if entries:
+        known = table.table("jet_models")
+        for name in known.keys():
+            entry = known.table(name)
+            models[name] = JetModel(**{key: entry.number(key) for key in coefficients})
+            entry.done()
+    jets = []
+    for entry in entries:
+        model = entry.text("model")
+        if model not in models:
+            raise ModelError(unknown("jet model", model, models))
+        throttle_min, throttle_max = entry.numbers("throttle", 2)
+        jet = Jet(name=entry.text("name"), frame=entry.text("frame"), model=models[model],
+                  thrust_max=entry.number("thrust_max"), throttle_min=float(throttle_min),
+                  throttle_max=float(throttle_max))  # fmt: skip
+        entry.done()
+        if not (jet.thrust_max > 0 and throttle_min < throttle_max):
+            raise ModelError(f"jet '{jet.name}': expected a positive thrust_max and a throttle range that rises")
+        jets.append(jet)
+    return tuple(jets)

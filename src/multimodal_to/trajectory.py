@@ -1,0 +1,188 @@
+"""`Trajectory`: every quantity of the problem on one time grid, with names and units, saved without pickle."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from multimodal_to.errors import OutputError, TrajectoryError
+
+FORMAT_VERSION = 1
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """What one array of a trajectory holds: its rows per body and the count of bodies, unit, and meaning."""
+
+    rows: int
+    of: str  # "robot", "joint", "contact" or "jet": what the rows are repeated for
+    unit: str
+    meaning: str
+
+
+QUANTITIES: Mapping[str, Quantity] = MappingProxyType({
+    "com_position": Quantity(rows=3, of="robot", unit="m", meaning="x, CoM in the world"),
+    "com_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ẋ"),
+    "com_acceleration": Quantity(rows=3, of="robot", unit="m/s²", meaning="ẍ"),
+    "angular_momentum": Quantity(rows=3, of="robot", unit="kg m²/s", meaning="hω, about the CoM, world axes"),
+    "angular_momentum_rate": Quantity(rows=3, of="robot", unit="N m", meaning="ḣω"),
+    "base_position": Quantity(rows=3, of="robot", unit="m", meaning="p, origin of the base in the world"),
+    "base_quaternion_xyzw": Quantity(rows=4, of="robot", unit="1", meaning="ρ, world-from-base rotation, x y z w"),
+    "base_linear_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ṗ, world axes"),
+    "base_angular_velocity": Quantity(rows=3, of="robot", unit="rad/s", meaning="ω, world axes"),
+    "joint_positions": Quantity(rows=1, of="joint", unit="rad", meaning="s"),
+    "joint_velocities": Quantity(rows=1, of="joint", unit="rad/s", meaning="ṡ"),
+    "contact_positions": Quantity(rows=3, of="contact", unit="m", meaning="p_i, contact points in the world"),
+    "contact_forces": Quantity(rows=3, of="contact", unit="N", meaning="f_i, on the robot, world axes"),
+    "contact_force_rates": Quantity(rows=3, of="contact", unit="N/s", meaning="ḟ_i"),
+    "complementarity_slack": Quantity(rows=1, of="contact", unit="N m", meaning="ε_n, bound of height × normal force"),
+    "sliding_slack": Quantity(rows=1, of="contact", unit="N m", meaning="ε_t, bound of slip × normal force"),
+    "thrust": Quantity(rows=1, of="jet", unit="N", meaning="T"),
+    "thrust_rate": Quantity(rows=1, of="jet", unit="N/s", meaning="Ṫ"),
+    "thrust_acceleration": Quantity(rows=1, of="jet", unit="N/s²", meaning="T̈"),
+    "throttle": Quantity(rows=1, of="jet", unit="%", meaning="u"),
+})
+"""The arrays of a `Trajectory` by name; each is (rows × bodies, knots + 1)."""
+
+_LABELS = ("joint_names", "contact_names", "jet_names")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trajectory:
+    """Every quantity of the optimal control problem at every knot.
+
+    Rates at knot k are those that backward Euler applies over the interval that ends at k. All vectors are in world
+    axes; stacked quantities follow the order of `joint_names`, `contact_names` and `jet_names`.
+
+    Raises:
+        TrajectoryError: an array is missing, has the wrong shape or is not finite, or time does not increase.
+    """
+
+    robot: str
+    scenario: str
+    time: Array  # [s], (knots + 1,)
+    joint_names: tuple[str, ...]
+    contact_names: tuple[str, ...]
+    jet_names: tuple[str, ...]
+
+    com_position: Array
+    com_velocity: Array
+    com_acceleration: Array
+    angular_momentum: Array
+    angular_momentum_rate: Array
+    base_position: Array
+    base_quaternion_xyzw: Array
+    base_linear_velocity: Array
+    base_angular_velocity: Array
+    joint_positions: Array
+    joint_velocities: Array
+    contact_positions: Array
+    contact_forces: Array
+    contact_force_rates: Array
+    complementarity_slack: Array
+    sliding_slack: Array
+    thrust: Array
+    thrust_rate: Array
+    thrust_acceleration: Array
+    throttle: Array
+
+    def __post_init__(self) -> None:
+        if self.time.ndim != 1 or self.time.size < 2:
+            raise TrajectoryError(f"'time' has shape {self.time.shape}; expected (knots + 1,) with at least two knots")
+        if not (np.isfinite(self.time).all() and (np.diff(self.time) > 0).all()):
+            raise TrajectoryError("'time' must be finite and increase from knot to knot")
+        bodies = {"robot": 1, "joint": len(self.joint_names), "contact": len(self.contact_names),
+                  "jet": len(self.jet_names)}  # fmt: skip
+        for name, quantity in QUANTITIES.items():
+            array, expected = getattr(self, name), (quantity.rows * bodies[quantity.of], self.time.size)
+            if array.shape != expected:
+                raise TrajectoryError(f"'{name}' has shape {array.shape}; expected {expected}")
+            if not np.isfinite(array).all():
+                raise TrajectoryError(f"'{name}' holds values that are not finite")
+
+    @property
+    def knots(self) -> int:
+        """Return the number of intervals N; the arrays have N + 1 columns."""
+        return int(self.time.size - 1)
+
+    @property
+    def duration(self) -> float:
+        """Return the time from the first knot to the last [s]."""
+        return float(self.time[-1] - self.time[0])
+
+    def per_contact(self, name: str) -> Array:
+        """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1)."""
+        return getattr(self, name).reshape(len(self.contact_names), -1, self.time.size)  # type: ignore[no-any-return]
+
+    def vertical_contact_force(self) -> Array:
+        """Return the sum of the world-vertical contact forces [N], (knots + 1,)."""
+        return np.asarray(self.per_contact("contact_forces")[:, 2].sum(axis=0))
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the trajectory as a compressed `.npz` without pickle; the file appears whole or not at all.
+
+        Raises:
+            OutputError: the folder does not exist or cannot be written.
+        """
+        target = Path(path)
+        arrays = {name: getattr(self, name) for name in QUANTITIES}
+        labels = {name: np.array(getattr(self, name), dtype=np.str_) for name in _LABELS}
+        try:
+            with tempfile.NamedTemporaryFile(dir=target.parent, suffix=".npz", delete=False) as file:
+                try:
+                    np.savez_compressed(
+                        file, format_version=np.array(FORMAT_VERSION), robot=np.array(self.robot),
+                        scenario=np.array(self.scenario), time=self.time, knots=np.array(self.knots),
+                        total_time=np.array(self.duration), **labels, **arrays,
+                    )  # fmt: skip
+                    file.close()
+                    Path(file.name).chmod(0o644)
+                    Path(file.name).replace(target)
+                except BaseException:
+                    Path(file.name).unlink(missing_ok=True)
+                    raise
+        except OSError as error:
+            raise OutputError(f"cannot write the trajectory to '{target}': {error.strerror or error}") from error
+        return target
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Trajectory:
+        """Read a trajectory that `save` wrote.
+
+        Raises:
+            TrajectoryError: the file is missing, is no such archive, or lacks a quantity.
+        """
+        source = Path(path)
+        try:
+            with np.load(source, allow_pickle=False) as archive:
+                stored = {name: archive[name] for name in archive.files}
+        except FileNotFoundError:
+            raise TrajectoryError(f"no trajectory file '{source}'") from None
+        except (OSError, ValueError, EOFError, AttributeError, zipfile.BadZipFile) as error:
+            raise TrajectoryError(f"'{source}' is not a trajectory file of this library ({error})") from error
+        version = stored.get("format_version")
+        if version is None or version.shape != () or version.dtype.kind not in "iu":
+            raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it has no format_version")
+        if int(version) != FORMAT_VERSION:
+            raise TrajectoryError(f"'{source}' has format version {version}; this release reads {FORMAT_VERSION}")
+        wanted = ("robot", "scenario", "time", *_LABELS, *QUANTITIES)
+        if missing := [name for name in wanted if name not in stored]:
+            raise TrajectoryError(f"'{source}' lacks {', '.join(missing)}")
+        for name in ("time", *QUANTITIES):
+            if stored[name].dtype.kind not in "fiu":
+                raise TrajectoryError(f"'{source}': '{name}' is not numeric")
+        return cls(
+            robot=str(stored["robot"]), scenario=str(stored["scenario"]), time=np.asarray(stored["time"], dtype=float),
+            **{name: tuple(str(label) for label in np.atleast_1d(stored[name])) for name in _LABELS},  # type: ignore[arg-type]
+            **{name: np.asarray(stored[name], dtype=float) for name in QUANTITIES},
+        )  # fmt: skip
