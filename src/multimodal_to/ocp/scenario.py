@@ -1,0 +1,123 @@
+"""`Scenario`: a task as data. What is asked of the motion, and how its qualities are weighed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from enum import Enum
+from types import MappingProxyType
+
+from multimodal_to.errors import ScenarioError
+from multimodal_to.models.terrain import FlatGround, Surface
+
+Vector3 = tuple[float, float, float]
+
+
+class Terminal(Enum):
+    """How a motion ends."""
+
+    HOVER = "hover"
+    """At rest in the air: nothing moves, no contact force, the thrusts carry the weight and hold still."""
+    FREE = "free"
+    """Only the final CoM is asked for; the final costs pull the rest towards equilibrium."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weights:
+    """Weight of each cost; a weight of zero adds nothing to the problem.
+
+    Running costs are weight × squared 2-norm × Δt at the end of every interval, except the slacks, which are linear;
+    `final_*` are weight × squared 2-norm at the last knot, without Δt.
+    """
+
+    com_velocity: float = 0.0  # ẋ [m/s]
+    com_acceleration: float = 0.0  # ẍ [m/s²]
+    angular_momentum: float = 0.0  # hω [kg m²/s]
+    angular_momentum_rate: float = 0.0  # ḣω [N m]
+    base_acceleration: float = 0.0  # v̇, of the base's twist [m/s², rad/s²]
+    joint_velocities: Mapping[str, float] = field(default_factory=dict)  # ṡ by joint group [rad/s]
+    posture: float = 0.0  # s − s̄ [rad]
+    base_orientation: float = 0.0  # base away from upright, as a quaternion's vector part [1]
+    contact_forces: float = 0.0  # f [N]
+    contact_force_rates: float = 0.0  # ḟ [N/s]
+    thrust: float = 0.0  # T [N]
+    thrust_rate: float = 0.0  # Ṫ [N/s]
+    throttle: float = 0.0  # u [%]
+    complementarity_slack: float = 0.0  # ε_n [N m], linear
+    sliding_slack: float = 0.0  # ε_t [N m], linear
+    final_com_velocity: float = 0.0
+    final_com_acceleration: float = 0.0
+    final_angular_momentum: float = 0.0
+    final_angular_momentum_rate: float = 0.0
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            for number in value.values() if isinstance(value, Mapping) else (value,):
+                if not (math.isfinite(number) and number >= 0):
+                    raise ScenarioError(f"weight '{entry.name}' is {number}; expected a number of at least zero")
+        object.__setattr__(self, "joint_velocities", MappingProxyType(dict(self.joint_velocities)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """A task: where the CoM starts and ends, in how many knots and how much time, and the weights.
+
+    The robot starts standing still in equilibrium: a posture near home with both soles on the ground and the CoM at
+    `initial_com`, contact forces that hold the weight, no thrust.
+
+    Raises:
+        ScenarioError: numbers that contradict each other.
+    """
+
+    name: str
+    title: str
+    knots: int  # N, the number of intervals
+    initial_com: Vector3  # [m]
+    final_com: Vector3  # [m]
+    terminal: Terminal
+    interval_min: float  # least Δt [s]
+    interval_max: float  # greatest Δt [s]
+    weights: Weights
+    surface: Surface = FlatGround()
+    friction: float | None = None  # None: the robot's own
+    slack_max: float = 1.0  # bound of both slacks [N m]
+    base_speed_max: float = 2.0  # of each component of the base's twist [m/s, rad/s]
+    com_range: Vector3 = (1.5, 1.5, 1.5)  # the CoM's greatest distance from the world's origin, by axis [m]
+    guess_thrust: float = 30.0  # of every jet in the start guess [N]
+
+    def __post_init__(self) -> None:
+        if self.knots < 3:
+            raise ScenarioError(f"knots is {self.knots}; expected at least 3")
+        if not (0 < self.interval_min <= self.interval_max < math.inf):
+            raise ScenarioError(
+                f"interval_min {self.interval_min} s and interval_max {self.interval_max} s; "
+                "expected 0 < interval_min <= interval_max"
+            )
+        for label in ("initial_com", "final_com", "com_range"):
+            value = getattr(self, label)
+            if len(value) != 3 or not all(math.isfinite(number) for number in value):
+                raise ScenarioError(f"{label} is {value}; expected three finite numbers [m]")
+        for label in ("initial_com", "final_com"):
+            for axis, number, bound in zip("xyz", getattr(self, label), self.com_range, strict=True):
+                if abs(number) > bound:
+                    raise ScenarioError(f"{label} has {axis} = {number} m, beyond com_range, {bound} m")
+        for label in ("slack_max", "base_speed_max"):
+            if not 0 < getattr(self, label) < math.inf:
+                raise ScenarioError(f"{label} is {getattr(self, label)}; expected a positive number")
+        if self.friction is not None and not 0 < self.friction < math.inf:
+            raise ScenarioError(f"friction is {self.friction}; expected a positive number")
+        if not 0 <= self.guess_thrust < math.inf:
+            raise ScenarioError(f"guess_thrust is {self.guess_thrust} N; expected a number of at least zero")
+        self._check_reach()
+
+    def _check_reach(self) -> None:
+        """Refuse a distance that the CoM cannot travel at the greatest base speed in the longest time."""
+        longest = self.knots * self.interval_max
+        for axis, start, end in zip("xyz", self.initial_com, self.final_com, strict=True):
+            if abs(end - start) > self.base_speed_max * longest:
+                raise ScenarioError(
+                    f"the CoM has to go {abs(end - start):.3g} m along {axis} in at most {longest:.3g} s, faster than "
+                    f"base_speed_max, {self.base_speed_max} m/s; allow more knots, a longer interval_max or more speed"
+                )

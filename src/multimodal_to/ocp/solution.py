@@ -1,0 +1,181 @@
+"""`solve`: run a solver on a problem, and say by name what came out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
+
+from multimodal_to.errors import SolverError
+from multimodal_to.ocp.problem import Problem
+from multimodal_to.ocp.solvers import Ipopt, Status
+from multimodal_to.ocp.variables import INTERVAL_SCALE
+from multimodal_to.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Iterate:
+    """Where a solve stands."""
+
+    iteration: int
+    objective: float
+    worst: str  # name of the rows or bounds with the largest violation
+    violation: float  # in its own unit
+    unit: str
+    elapsed: float  # [s]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Solution:
+    """What a solve ended with: its verdict by name, and the trajectory."""
+
+    status: Status
+    solver_message: str
+    trajectory: Trajectory
+    objective: float
+    costs: dict[str, float]  # by name; they add up to the objective
+    violations: dict[str, float]  # largest by name, recomputed from the problem, in their own units
+    units: dict[str, str] = field(repr=False)  # of the violations
+    iterations: int
+    solve_time: float  # wall time in the solver [s]
+    statistics: dict[str, Any] = field(repr=False)  # the solver's own
+
+    @property
+    def largest_violation(self) -> tuple[str, float, str]:
+        """Return name, size and unit of the largest violation."""
+        name = max(self.violations, key=self.violations.__getitem__)
+        return name, self.violations[name], self.units[name]
+
+
+Progress = Callable[[Iterate], bool]
+"""Called at every iteration; a true answer stops the solve."""
+
+
+def solve(problem: Problem, solver: Ipopt | None = None, progress: Progress | None = None) -> Solution:
+    """Solve a problem from its start guess.
+
+    Args:
+        problem: from `build`.
+        solver: by default `Ipopt()`.
+        progress: told of every iteration; it may stop the solve by returning True.
+    """
+    solver = solver or Ipopt()
+    opti, started = problem.opti, time.perf_counter()
+    options: dict[str, Any] = {
+        "print_time": False,
+        "detect_simple_bounds": True,
+        "jac_g": problem.nlp.jacobian,
+        "grad_f": problem.nlp.gradient,
+        "hess_lag": problem.nlp.hessian,
+    }
+    watcher = None
+    if progress is not None:
+        watcher = _Watcher(problem, progress, started)
+        options["iteration_callback"] = watcher
+    opti.solver("ipopt", options, solver.options())
+    opti.set_initial(opti.x, problem.guess)
+    try:
+        opti.solve_limited()
+    except RuntimeError as error:  # how Opti says that there is no solution, and everything else
+        failure: RuntimeError | None = error
+    else:
+        failure = None
+    elapsed = time.perf_counter() - started
+    if watcher is not None and watcher.error is not None:
+        raise watcher.error
+    try:
+        statistics = dict(opti.debug.stats())
+    except RuntimeError:  # no solver has run
+        raise SolverError(f"the solver did not run: {failure}") from failure
+    _check_bounds(problem, statistics)
+    x = np.array(opti.debug.value(opti.x)).ravel()
+    violations = problem.largest_violations(x)
+    costs = problem.costs(x)
+    message = str(statistics["return_status"])
+    return Solution(
+        status=Ipopt.status(message), solver_message=message, trajectory=_trajectory(problem, x),
+        objective=sum(costs.values()), costs=costs, violations=violations,
+        units={name: problem.unit(name) for name in violations}, iterations=int(statistics["iter_count"]),
+        solve_time=elapsed, statistics=statistics,
+    )  # fmt: skip
+
+
+def _check_bounds(problem: Problem, statistics: dict[str, Any]) -> None:
+    """Make sure that CasADi took the bounds, and nothing but the bounds, out of the rows.
+
+    The derivative functions are those of the remaining rows; were others left, the solver would work on wrong ones.
+    """
+    found = np.array(statistics["detect_simple_bounds_is_simple"], dtype=bool)
+    expected = np.arange(found.size) < problem.lower.size
+    if not np.array_equal(found, expected):
+        raise SolverError(f"CasADi took {found.sum()} rows for bounds, where {expected.sum()} are")
+
+
+def _trajectory(problem: Problem, x: Array) -> Trajectory:
+    """Return the trajectory of x: the variables in their own units, and the differences that are their rates."""
+    own = x * problem.scale
+    values = {
+        name: np.array(value)
+        for name, value in problem.layout.read(own[:-1].reshape(problem.layout.size, -1, order="F")).items()
+    }
+    dt, robot = float(own[-1]), problem.robot
+
+    def rate(name: str) -> Array:
+        difference: Array = np.diff(values[name], axis=1, prepend=values[name][:, :1]) / dt
+        return difference
+
+    return Trajectory(
+        robot=robot.name, scenario=problem.scenario.name, time=dt * np.arange(problem.scenario.knots + 1),
+        joint_names=robot.joint_names, contact_names=robot.contact_names, jet_names=robot.jet_names,
+        com_acceleration=rate("com_velocity"), angular_momentum_rate=rate("angular_momentum"),
+        contact_force_rates=rate("contact_forces"), thrust_acceleration=rate("thrust_rate"), **values,
+    )  # fmt: skip
+
+
+class _Watcher(cs.Callback):  # type: ignore[misc]
+    """CasADi's iteration callback: tells `progress` where the solve stands, and stops it when asked."""
+
+    def __init__(self, problem: Problem, progress: Progress, started: float) -> None:
+        cs.Callback.__init__(self)
+        self._problem, self._progress, self._started = problem, progress, started
+        self._iteration = 0
+        self.error: Exception | None = None
+        self.construct("watcher")
+
+    def get_n_in(self) -> int:
+        return int(cs.nlpsol_n_out())
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_name_in(self, index: int) -> str:
+        return str(cs.nlpsol_out(index))
+
+    def get_sparsity_in(self, index: int) -> cs.Sparsity:
+        variables = self._problem.lower.size
+        rows = variables + self._problem.row_lower.size  # Opti counts the bounds among them
+        sizes = {"f": 1, "x": variables, "lam_x": variables, "g": rows, "lam_g": rows}
+        return cs.Sparsity.dense(sizes.get(cs.nlpsol_out(index), 0), 1)
+
+    def eval(self, arguments: list[Any]) -> list[int]:
+        values = dict(zip((cs.nlpsol_out(index) for index in range(len(arguments))), arguments, strict=True))
+        x = np.array(values["x"]).ravel()
+        violations = self._problem.largest_violations(x)
+        worst = max(violations, key=violations.__getitem__)
+        iterate = Iterate(
+            iteration=self._iteration, objective=float(values["f"]), worst=worst, violation=violations[worst],
+            unit=self._problem.unit(worst), elapsed=time.perf_counter() - self._started,
+        )  # fmt: skip
+        self._iteration += 1
+        try:
+            return [int(bool(self._progress(iterate)))]
+        except Exception as error:  # it is raised once the solver has returned
+            self.error = error
+            return [1]
