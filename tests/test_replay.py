@@ -1,0 +1,269 @@
+from __future__ import annotations
+
+import base64
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+import umsgpack
+import yourdfpy
+
+from multimodal_to import replay
+from multimodal_to.errors import OutputError
+from multimodal_to.models.robot import load_robot
+from multimodal_to.plotting import frame_poses
+from synthetic import DURATION, KNOTS, take_off
+
+quaternion_matrix = replay.meshcat.transformations.quaternion_matrix
+quaternion_slerp = replay.meshcat.transformations.quaternion_slerp
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load_robot("ironcub")
+
+
+@pytest.fixture(scope="module")
+def trajectory(robot):
+    return take_off(robot)
+
+
+@pytest.fixture(scope="module")
+def page(robot, trajectory, tmp_path_factory):
+    path = tmp_path_factory.mktemp("replay") / "replay.html"
+    assert replay.write_html(robot, trajectory, path) == path
+    return path.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def stage(page):
+    return Stage(page)
+
+
+class Stage:
+    """What the viewer knows after the commands of a page."""
+
+    def __init__(self, page: str) -> None:
+        encoded = re.search(r"const commands = \[(.*?)\];", page, re.DOTALL).group(1)
+        commands = [umsgpack.unpackb(base64.b64decode(text)) for text in re.findall(r'"([^"]*)"', encoded)]
+        self.objects = {c["path"]: c["object"] for c in commands if c["type"] == "set_object"}
+        self.transforms = {
+            c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in commands if c["type"] == "set_transform"
+        }
+        self.properties = {(c["path"], c["property"]): c["value"] for c in commands if c["type"] == "set_property"}
+        (self.animation,) = (c for c in commands if c["type"] == "set_animation")
+        self.tracks = {
+            (animation["path"], track["name"].lstrip(".")): track["keys"]
+            for animation in self.animation["animations"]
+            for track in animation["clip"]["tracks"]
+        }
+        self.rates = {animation["clip"]["fps"] for animation in self.animation["animations"]}
+
+    def find(self, ending: str) -> str:
+        """Return the one path of an object or of a node above it that ends so."""
+        nodes = {path[: match.end()] for path in self.objects for match in re.finditer(r"[^/]+", path)}
+        (path,) = (node for node in nodes if node.endswith(f"/{ending}"))
+        return path
+
+    def value(self, path: str, key: str, knot: int) -> np.ndarray:
+        if (path, key) in self.tracks:
+            return np.array(self.tracks[path, key][knot]["value"])
+        return np.array(self.properties[path, key])
+
+    def world(self, path: str, knot: int, part: float = 0.0) -> np.ndarray:
+        """Return the pose of a node at a knot, or a part of the way to the next, from all nodes above it."""
+        pose = np.eye(4)
+        for match in list(re.finditer(r"[^/]+", path))[1:]:
+            pose = pose @ self._local(path[: match.end()], knot, part)
+        return pose
+
+    def _local(self, path: str, knot: int, part: float) -> np.ndarray:
+        if path in self.transforms:
+            return self.transforms[path]
+        after = min(knot + 1, KNOTS)
+        pose = np.eye(4)
+        if (path, "quaternion") in self.tracks or (path, "quaternion") in self.properties:
+            turns = [np.roll(self.value(path, "quaternion", k), 1) for k in (knot, after)]
+            pose = quaternion_matrix(quaternion_slerp(*turns, part))
+            places = [self.value(path, "position", k) for k in (knot, after)]
+            pose[:3, 3] = (1 - part) * places[0] + part * places[1]
+        return pose
+
+
+def test_the_page_fetches_nothing(page):
+    without_viewer = page.replace(replay._VIEWER.read_text(encoding="utf-8"), "")
+    assert len(without_viewer) < len(page)
+    assert "http" not in without_viewer
+    assert not re.search(r"(src|action)\s*=", without_viewer)
+    assert re.findall(r'href="([^"]*)"', without_viewer) == ["data:,"]
+    assert not re.search(r"fetch|@import|url\(|WebSocket|\.connect\(", without_viewer)
+
+
+def test_the_page_names_scenario_and_robot_and_stays_small(page, trajectory):
+    assert f"<title>take-off &amp; hover · {trajectory.robot}</title>" in page
+    assert len(page.encode()) < 1.5e6
+
+
+def test_every_visual_of_every_link_is_drawn(robot, stage):
+    urdf = yourdfpy.URDF.load(str(robot.urdf), build_scene_graph=False, load_meshes=False)
+    visuals = {link.name: len(link.visuals) for link in urdf.robot.links if link.visuals}
+    assert len(visuals) >= 24
+    for name, count in visuals.items():
+        for index in range(count):
+            assert any(path.endswith(f"/{name}/visual_{index}") for path in stage.objects)
+
+
+def test_the_animation_runs_from_the_first_knot_to_the_last_at_true_speed_and_repeats(stage, trajectory):
+    assert stage.rates == {1}
+    assert stage.animation["options"] == {"play": True, "repetitions": np.inf}
+    for keys in stage.tracks.values():
+        times = [key["time"] for key in keys]
+        np.testing.assert_allclose(times[:-1], trajectory.time, atol=1e-12)
+        assert times[-1] == pytest.approx(DURATION + replay.HOLD)
+        assert keys[-1]["value"] == keys[-2]["value"]
+
+
+@pytest.mark.parametrize("link", ["root_link", "head", "l_elbow_1", "r_ankle_2", "chest_l_jet_turbine"])
+def test_links_are_where_forward_kinematics_puts_them_at_the_knots(robot, trajectory, stage, link):
+    poses, path = frame_poses(robot, trajectory, link), stage.find(link)
+    for knot in range(KNOTS + 1):
+        np.testing.assert_allclose(stage.world(path, knot), poses[knot], atol=1e-9)
+
+
+def test_between_two_knots_every_joint_moves_linearly(robot, trajectory, stage):
+    half_way = {
+        name: np.repeat((getattr(trajectory, name)[:, 12:13] + getattr(trajectory, name)[:, 13:14]) / 2, KNOTS + 1, 1)
+        for name in ("base_position", "base_quaternion_xyzw", "joint_positions")
+    }
+    for link in ("head", "r_elbow_1", "l_ankle_2"):
+        expected = frame_poses(robot, replace(trajectory, **half_way), link)[0]
+        np.testing.assert_allclose(stage.world(stage.find(link), 12, 0.5), expected, atol=1e-9)
+
+
+def test_quaternions_never_change_sign_between_keys(stage):
+    tracks = [keys for (_, key), keys in stage.tracks.items() if key == "quaternion"]
+    assert len(tracks) > 20
+    for keys in tracks:
+        values = np.array([key["value"] for key in keys])
+        assert (np.sum(values[1:] * values[:-1], axis=1) > 0).all()
+        np.testing.assert_allclose(np.linalg.norm(values, axis=1), 1.0, atol=1e-9)
+
+
+def test_a_flame_is_as_long_as_its_thrust_is_large_and_has_no_length_without_thrust(robot, trajectory, stage):
+    strongest = max(jet.thrust_max for jet in robot.jets)
+    for jet, thrust in zip(robot.jets, trajectory.thrust, strict=True):
+        path = stage.find(f"{jet.frame}/flame")
+        lengths = np.array([stage.value(path, "scale", knot)[2] for knot in range(KNOTS + 1)])
+        assert thrust[0] == 0.0
+        assert lengths[0] == 0.0
+        np.testing.assert_allclose(lengths, replay.FLAME_LENGTH * thrust / strongest, atol=1e-12)
+
+
+def test_a_jet_that_never_burns_has_a_hidden_flame(robot, trajectory, tmp_path):
+    cold = replace(trajectory, thrust=np.zeros_like(trajectory.thrust))
+    stage = Stage(replay.write_html(robot, cold, tmp_path / "cold.html").read_text())
+    for jet in robot.jets:
+        assert stage.properties[stage.find(f"{jet.frame}/flame"), "visible"] is False
+
+
+def test_exhaust_leaves_along_plus_z_of_the_jet_frame(robot, trajectory, stage):
+    for jet in robot.jets:
+        flame = stage.find(f"{jet.frame}/flame")
+        tip = stage.world(f"{flame}/plume", 0) @ [0.0, 0.5, 0.0, 1.0]  # meshcat's cylinders are along y
+        pose = frame_poses(robot, trajectory, jet.frame)[0]
+        np.testing.assert_allclose(tip, pose @ [0.0, 0.0, 1.0, 1.0], atol=1e-9)
+        (plume,) = stage.objects[f"{flame}/plume"]["geometries"]
+        assert plume["radiusTop"] < plume["radiusBottom"]
+
+
+def test_arrows_start_at_the_contact_points_and_point_along_the_forces(robot, trajectory, stage):
+    points, forces = trajectory.per_contact("contact_positions"), trajectory.per_contact("contact_forces")
+    for name, point, force in zip(trajectory.contact_names, points, forces, strict=True):
+        path = stage.find(f"contact_forces/{name}")
+        for knot in range(KNOTS + 1):
+            pose, size = stage.world(path, knot), np.linalg.norm(force[:, knot])
+            np.testing.assert_allclose(pose[:3, 3], point[:, knot], atol=1e-9)
+            length = stage.value(path, "scale", knot)[2]
+            if size > replay.SMALLEST_FORCE:
+                np.testing.assert_allclose(pose[:3, 2], force[:, knot] / size, atol=1e-9)
+                assert length == pytest.approx(replay.ARROW_LENGTH * size / robot.weight)
+            else:
+                assert length == 0.0
+        visible = [stage.value(path, "visible", knot) for knot in range(KNOTS + 1)]
+        assert visible[0]
+        assert not any(visible[KNOTS // 2 :])
+
+
+def test_an_arrow_can_point_straight_down_or_sideways():
+    vectors = np.array([[0.0, 0.0, -50.0], [30.0, 0.0, 0.0], [0.0, -2.0, 0.0], [1e-9, 0.0, -9.0], [0.0, 0.0, 0.0]])
+    for vector, (x, y, z, w) in zip(vectors, replay._turns_from_z(vectors), strict=True):
+        direction = quaternion_matrix([w, x, y, z])[:3, 2]
+        expected = vector / np.linalg.norm(vector) if vector.any() else [0.0, 0.0, 1.0]
+        np.testing.assert_allclose(direction, expected, atol=1e-6)
+
+
+def test_the_sphere_follows_the_com(trajectory, stage):
+    for knot in (0, 7, KNOTS):
+        np.testing.assert_allclose(stage.value("/meshcat/com", "position", knot), trajectory.com_position[:, knot])
+
+
+def test_the_drawn_robot_looks_where_its_toes_point_and_carries_the_jets_on_its_back(robot, trajectory, stage):
+    toes_forward = frame_poses(robot, trajectory, "l_ankle_2")[0][:3, 0]
+    knot_poses = {name: frame_poses(robot, trajectory, name)[0] for name in ("head", "chest", "chest_l_jet_turbine")}
+    red = 0xCC1F1A
+    (mouth,) = (
+        path for path, thing in stage.objects.items()
+        if "/head/visual_" in path and thing["materials"][0]["color"] == red
+    )  # fmt: skip
+    mouth_from_head = stage.world(mouth, 0)[:3, 3] - knot_poses["head"][:3, 3]
+    jet_from_chest = knot_poses["chest_l_jet_turbine"][:3, 3] - knot_poses["chest"][:3, 3]
+    assert mouth_from_head @ toes_forward > 0.03
+    assert jet_from_chest @ toes_forward < -0.03
+
+
+def test_a_mesh_is_drawn_and_a_missing_one_is_left_out(robot, trajectory, tmp_path):
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "there.stl")
+    text = robot.urdf.read_text(encoding="utf-8")
+    mesh = '<visual><geometry><mesh filename="{}.stl" scale="2 2 2"/></geometry></visual>'
+    visuals = mesh.format("there") + mesh.format("gone")
+    changed = tmp_path / "robot.urdf"
+    changed.write_text(text.replace('<link name="root_link">', f'<link name="root_link">{visuals}'), encoding="utf-8")
+    stage = Stage(replay.write_html(replace(robot, urdf=changed), trajectory, tmp_path / "r.html").read_text())
+    root = stage.find("root_link")
+    (mesh,) = stage.objects[f"{root}/visual_0"]["geometries"]
+    vertices = np.frombuffer(mesh["data"]["attributes"]["position"]["array"].data, dtype=np.float32)
+    assert vertices.max() == pytest.approx(0.1)
+    assert f"{root}/visual_1" not in stage.objects
+    assert f"{root}/visual_2" in stage.objects
+
+
+def test_a_robot_without_jets_is_drawn_without_flames(robot, trajectory, tmp_path):
+    none = np.zeros((0, trajectory.time.size))
+    walker = replace(
+        trajectory, jet_names=(), thrust=none, thrust_rate=none, thrust_acceleration=none, throttle=none
+    )  # fmt: skip
+    stage = Stage(replay.write_html(replace(robot, jets=()), walker, tmp_path / "walker.html").read_text())
+    assert stage.find("chest_l_jet_turbine")
+    assert not any("flame" in path for path in stage.objects)
+
+
+def test_a_page_that_cannot_be_written_says_where(robot, trajectory, tmp_path):
+    with pytest.raises(OutputError, match="nowhere"):
+        replay.write_html(robot, trajectory, tmp_path / "nowhere" / "replay.html")
+
+
+def test_the_live_viewer_serves_the_same_scene_without_a_word(robot, trajectory, stage, capfd):
+    visualizer = replay.show(robot, trajectory)
+    try:
+        assert visualizer.url().startswith("http://127.0.0.1:")
+        served = visualizer.static_html()
+    finally:
+        window = visualizer.window
+        window.zmq_socket.close()
+        window.server_proc.kill()
+        window.server_proc.communicate()
+    assert served.count("fetch(") >= len(stage.objects)
+    captured = capfd.readouterr()
+    assert captured.out == captured.err == ""
