@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from multimodal_to.derived import frame_poses
 from multimodal_to.models.robot import Robot
-from multimodal_to.plotting import frame_poses
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 
 DURATION = 2.0  # [s]

@@ -9,7 +9,7 @@ from matplotlib._pylab_helpers import Gcf
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Rectangle
 
-from multimodal_to import plotting
+from multimodal_to import derived, plotting
 from multimodal_to.models.robot import load_robot
 from synthetic import DURATION, LIFT_OFF, take_off
 
@@ -73,10 +73,10 @@ def test_a_robot_that_stays_on_the_ground_has_no_band(robot, trajectory):
 
 def test_a_force_just_below_the_threshold_counts_as_flight(robot, trajectory):
     forces = np.zeros_like(trajectory.contact_forces)
-    forces[2] = 0.99 * plotting.FLIGHT_FORCE
-    assert plotting.flight_phases(replace(trajectory, contact_forces=forces)) == [(0.0, DURATION)]
-    forces[2] = 1.01 * plotting.FLIGHT_FORCE
-    assert plotting.flight_phases(replace(trajectory, contact_forces=forces)) == []
+    forces[2] = 0.99 * derived.FLIGHT_FORCE
+    assert derived.flight_phases(replace(trajectory, contact_forces=forces)) == [(0.0, DURATION)]
+    forces[2] = 1.01 * derived.FLIGHT_FORCE
+    assert derived.flight_phases(replace(trajectory, contact_forces=forces)) == []
 
 
 def test_limits_and_weight_are_dashed_lines(figure, robot):
@@ -91,9 +91,9 @@ def test_limits_and_weight_are_dashed_lines(figure, robot):
 def test_the_vertical_thrust_is_the_thrust_against_the_exhaust(robot, trajectory):
     expected = np.zeros(trajectory.time.size)
     for jet, thrust in zip(robot.jets, trajectory.thrust, strict=True):
-        exhaust = plotting.frame_poses(robot, trajectory, jet.frame)[:, :3, 2]
+        exhaust = derived.frame_poses(robot, trajectory, jet.frame)[:, :3, 2]
         expected += (-thrust[:, None] * exhaust)[:, 2]
-    vertical = plotting.vertical_thrust(robot, trajectory)
+    vertical = derived.vertical_thrust(robot, trajectory)
     np.testing.assert_allclose(vertical, expected, atol=1e-9)
     assert vertical[-1] > 0.0  # the jets point down
 
@@ -108,7 +108,7 @@ def test_a_robot_without_jets_can_be_plotted(robot, trajectory):
 
 
 def test_frame_poses_are_those_of_the_base_for_the_base(robot, trajectory):
-    poses = plotting.frame_poses(robot, trajectory, "root_link")
+    poses = derived.frame_poses(robot, trajectory, "root_link")
     np.testing.assert_allclose(poses[:, :3, 3], trajectory.base_position.T, atol=1e-12)
     yaw = np.arctan2(poses[:, 1, 0], poses[:, 0, 0])
     np.testing.assert_allclose(yaw, 2 * np.arctan2(*trajectory.base_quaternion_xyzw[2:]), atol=1e-12)

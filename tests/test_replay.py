@@ -11,9 +11,9 @@ import umsgpack
 import yourdfpy
 
 from multimodal_to import replay
+from multimodal_to.derived import frame_poses
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import load_robot
-from multimodal_to.plotting import frame_poses
 from synthetic import DURATION, KNOTS, take_off
 
 quaternion_matrix = replay.meshcat.transformations.quaternion_matrix

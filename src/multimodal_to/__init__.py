@@ -1,0 +1,33 @@
+"""Whole-body trajectory optimisation of robots that walk and fly.
+
+A `Robot` and a `Scenario` go into `build`; `solve` returns a `Solution` with a `Trajectory` and its own verdict;
+`audit`, `multimodal_to.plotting` and `multimodal_to.replay` need only the trajectory and the robot.
+"""
+
+from multimodal_to import scenarios
+from multimodal_to.adam import KinDynComputations
+from multimodal_to.audit import Audit, audit
+from multimodal_to.errors import MultimodalError
+from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.ocp import Ipopt, Problem, Scenario, Solution, Status, Terminal, Weights, build, solve
+from multimodal_to.trajectory import Trajectory
+
+__all__ = [
+    "Audit",
+    "Ipopt",
+    "KinDynComputations",
+    "MultimodalError",
+    "Problem",
+    "Robot",
+    "Scenario",
+    "Solution",
+    "Status",
+    "Terminal",
+    "Trajectory",
+    "Weights",
+    "audit",
+    "build",
+    "load_robot",
+    "scenarios",
+    "solve",
+]

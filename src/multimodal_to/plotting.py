@@ -4,18 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import casadi as cs
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from multimodal_to.adam import quaternion
-from multimodal_to.adam.spatial import homogeneous
+from multimodal_to.derived import flight_phases, vertical_thrust
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Array, Trajectory
-
-FLIGHT_FORCE = 1.0
-"""Below this total vertical contact force the robot counts as flying [N]."""
 
 _SIZE = (7.5, 8.5)  # of the figure [inch]
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # told apart by colour-blind eyes too
@@ -25,36 +19,11 @@ _LIMIT: dict[str, Any] = {"color": "0.35", "linestyle": (0, (6, 4)), "linewidth"
 _LEGEND_ROWS = 2
 
 
-def frame_poses(robot: Robot, trajectory: Trajectory, frame: str) -> Array:
-    """Return w_H_frame, the world pose of a link or frame at every knot, (knots + 1, 4, 4)."""
-    position, rho, s = cs.MX.sym("p", 3), cs.MX.sym("rho", 4), cs.MX.sym("s", len(trajectory.joint_names))
-    w_H_base = homogeneous(quaternion.rotation_matrix(rho / cs.norm_2(rho)), position)
-    w_H_frame = robot.kindyn.forward_kinematics_fun(frame)(w_H_base, s)
-    knots = cs.Function("frame_pose", [position, rho, s], [w_H_frame]).map(trajectory.time.size)
-    side_by_side = knots(trajectory.base_position, trajectory.base_quaternion_xyzw, trajectory.joint_positions)
-    return np.array(side_by_side).reshape(4, -1, 4).transpose(1, 0, 2)
-
-
-def vertical_thrust(robot: Robot, trajectory: Trajectory) -> Array:
-    """Return the world-vertical sum of the thrusts, Σ_j −T_j (w_R_j e_z)·e_z [N], (knots + 1,)."""
-    total = np.zeros(trajectory.time.size)
-    for jet, thrust in zip(robot.jets, trajectory.thrust, strict=True):
-        total -= thrust * frame_poses(robot, trajectory, jet.frame)[:, 2, 2]
-    return total
-
-
-def flight_phases(trajectory: Trajectory) -> list[tuple[float, float]]:
-    """Return start and end [s] of each run of knots whose total vertical contact force is below `FLIGHT_FORCE`."""
-    flying = np.concatenate(([False], trajectory.vertical_contact_force() < FLIGHT_FORCE, [False]))
-    starts, ends = np.flatnonzero(~flying[:-1] & flying[1:]), np.flatnonzero(flying[:-1] & ~flying[1:]) - 1
-    return [(float(trajectory.time[i]), float(trajectory.time[j])) for i, j in zip(starts, ends, strict=True)]
-
-
 def plot_forces(robot: Robot, trajectory: Trajectory) -> Figure:
     """Plot throttle [%], thrust [N] and total vertical contact force [N] over time, one panel each.
 
-    Flight (`FLIGHT_FORCE`) is a translucent red band; limits are dashed; beside the contact force stand the weight m g
-    and the vertical sum of the thrusts, which takes the weight over from the ground. Legends stand above their panels.
+    Flight (`derived.FLIGHT_FORCE`) is a translucent red band; limits are dashed; beside the contact force stand the
+    weight m g and the vertical sum of the thrusts, which takes it over from the ground. Legends stand above their panels.
     """
     figure = Figure(figsize=_SIZE, layout="constrained")
     throttle, thrust, force = figure.subplots(3, 1, sharex=True)

@@ -23,9 +23,9 @@ import trimesh
 import umsgpack
 import yourdfpy
 
+from multimodal_to.derived import frame_poses
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import Robot
-from multimodal_to.plotting import frame_poses
 from multimodal_to.trajectory import Array, Trajectory
 
 with warnings.catch_warnings():  # meshcat imports a module of pyzmq that says it is deprecated

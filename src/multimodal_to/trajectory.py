@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,28 +32,32 @@ class Quantity:
     meaning: str
 
 
-QUANTITIES: Mapping[str, Quantity] = MappingProxyType({
-    "com_position": Quantity(rows=3, of="robot", unit="m", meaning="x, CoM in the world"),
-    "com_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ẋ"),
-    "com_acceleration": Quantity(rows=3, of="robot", unit="m/s²", meaning="ẍ"),
-    "angular_momentum": Quantity(rows=3, of="robot", unit="kg m²/s", meaning="hω, about the CoM, world axes"),
-    "angular_momentum_rate": Quantity(rows=3, of="robot", unit="N m", meaning="ḣω"),
-    "base_position": Quantity(rows=3, of="robot", unit="m", meaning="p, origin of the base in the world"),
-    "base_quaternion_xyzw": Quantity(rows=4, of="robot", unit="1", meaning="ρ, world-from-base rotation, x y z w"),
-    "base_linear_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ṗ, world axes"),
-    "base_angular_velocity": Quantity(rows=3, of="robot", unit="rad/s", meaning="ω, world axes"),
-    "joint_positions": Quantity(rows=1, of="joint", unit="rad", meaning="s"),
-    "joint_velocities": Quantity(rows=1, of="joint", unit="rad/s", meaning="ṡ"),
-    "contact_positions": Quantity(rows=3, of="contact", unit="m", meaning="p_i, contact points in the world"),
-    "contact_forces": Quantity(rows=3, of="contact", unit="N", meaning="f_i, on the robot, world axes"),
-    "contact_force_rates": Quantity(rows=3, of="contact", unit="N/s", meaning="ḟ_i"),
-    "complementarity_slack": Quantity(rows=1, of="contact", unit="N m", meaning="ε_n, bound of height × normal force"),
-    "sliding_slack": Quantity(rows=1, of="contact", unit="N m", meaning="ε_t, bound of slip × normal force"),
-    "thrust": Quantity(rows=1, of="jet", unit="N", meaning="T"),
-    "thrust_rate": Quantity(rows=1, of="jet", unit="N/s", meaning="Ṫ"),
-    "thrust_acceleration": Quantity(rows=1, of="jet", unit="N/s²", meaning="T̈"),
-    "throttle": Quantity(rows=1, of="jet", unit="%", meaning="u"),
-})
+QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
+    {
+        "com_position": Quantity(rows=3, of="robot", unit="m", meaning="x, CoM in the world"),
+        "com_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ẋ"),
+        "com_acceleration": Quantity(rows=3, of="robot", unit="m/s²", meaning="ẍ"),
+        "angular_momentum": Quantity(rows=3, of="robot", unit="kg m²/s", meaning="hω, about the CoM, world axes"),
+        "angular_momentum_rate": Quantity(rows=3, of="robot", unit="N m", meaning="ḣω"),
+        "base_position": Quantity(rows=3, of="robot", unit="m", meaning="p, origin of the base in the world"),
+        "base_quaternion_xyzw": Quantity(rows=4, of="robot", unit="1", meaning="ρ, world-from-base rotation, x y z w"),
+        "base_linear_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ṗ, world axes"),
+        "base_angular_velocity": Quantity(rows=3, of="robot", unit="rad/s", meaning="ω, world axes"),
+        "joint_positions": Quantity(rows=1, of="joint", unit="rad", meaning="s"),
+        "joint_velocities": Quantity(rows=1, of="joint", unit="rad/s", meaning="ṡ"),
+        "contact_positions": Quantity(rows=3, of="contact", unit="m", meaning="p_i, contact points in the world"),
+        "contact_forces": Quantity(rows=3, of="contact", unit="N", meaning="f_i, on the robot, world axes"),
+        "contact_force_rates": Quantity(rows=3, of="contact", unit="N/s", meaning="ḟ_i"),
+        "complementarity_slack": Quantity(
+            rows=1, of="contact", unit="N m", meaning="ε_n, bound of height × normal force"
+        ),
+        "sliding_slack": Quantity(rows=1, of="contact", unit="N m", meaning="ε_t, bound of slip × normal force"),
+        "thrust": Quantity(rows=1, of="jet", unit="N", meaning="T"),
+        "thrust_rate": Quantity(rows=1, of="jet", unit="N/s", meaning="Ṫ"),
+        "thrust_acceleration": Quantity(rows=1, of="jet", unit="N/s²", meaning="T̈"),
+        "throttle": Quantity(rows=1, of="jet", unit="%", meaning="u"),
+    }
+)
 """The arrays of a `Trajectory` by name; each is (rows × bodies, knots + 1)."""
 
 _LABELS = ("joint_names", "contact_names", "jet_names")
@@ -135,16 +141,20 @@ class Trajectory:
             OutputError: the folder does not exist or cannot be written.
         """
         target = Path(path)
-        arrays = {name: getattr(self, name) for name in QUANTITIES}
-        labels = {name: np.array(getattr(self, name), dtype=np.str_) for name in _LABELS}
+        arrays: dict[str, Any] = {
+            "format_version": np.array(FORMAT_VERSION),
+            "robot": np.array(self.robot),
+            "scenario": np.array(self.scenario),
+            "time": self.time,
+            "knots": np.array(self.knots),
+            "total_time": np.array(self.duration),
+            **{name: np.array(getattr(self, name), dtype=np.str_) for name in _LABELS},
+            **{name: getattr(self, name) for name in QUANTITIES},
+        }
         try:
             with tempfile.NamedTemporaryFile(dir=target.parent, suffix=".npz", delete=False) as file:
                 try:
-                    np.savez_compressed(
-                        file, format_version=np.array(FORMAT_VERSION), robot=np.array(self.robot),
-                        scenario=np.array(self.scenario), time=self.time, knots=np.array(self.knots),
-                        total_time=np.array(self.duration), **labels, **arrays,
-                    )  # fmt: skip
+                    np.savez_compressed(file, allow_pickle=False, **arrays)
                     file.close()
                     Path(file.name).chmod(0o644)
                     Path(file.name).replace(target)
@@ -163,13 +173,15 @@ class Trajectory:
             TrajectoryError: the file is missing, is no such archive, or lacks a quantity.
         """
         source = Path(path)
+        if not source.is_file():
+            raise TrajectoryError(f"no trajectory file '{source}'")
+        if not zipfile.is_zipfile(source):
+            raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it is no .npz archive")
         try:
             with np.load(source, allow_pickle=False) as archive:
                 stored = {name: archive[name] for name in archive.files}
-        except FileNotFoundError:
-            raise TrajectoryError(f"no trajectory file '{source}'") from None
-        except (OSError, ValueError, EOFError, AttributeError, zipfile.BadZipFile) as error:
-            raise TrajectoryError(f"'{source}' is not a trajectory file of this library ({error})") from error
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+            raise TrajectoryError(f"'{source}' is not a trajectory file of this library: {error}") from error
         version = stored.get("format_version")
         if version is None or version.shape != () or version.dtype.kind not in "iu":
             raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it has no format_version")
@@ -181,8 +193,7 @@ class Trajectory:
         for name in ("time", *QUANTITIES):
             if stored[name].dtype.kind not in "fiu":
                 raise TrajectoryError(f"'{source}': '{name}' is not numeric")
-        return cls(
-            robot=str(stored["robot"]), scenario=str(stored["scenario"]), time=np.asarray(stored["time"], dtype=float),
-            **{name: tuple(str(label) for label in np.atleast_1d(stored[name])) for name in _LABELS},  # type: ignore[arg-type]
-            **{name: np.asarray(stored[name], dtype=float) for name in QUANTITIES},
-        )  # fmt: skip
+        fields: dict[str, Any] = {"robot": str(stored["robot"]), "scenario": str(stored["scenario"])}
+        fields |= {name: tuple(str(label) for label in np.atleast_1d(stored[name])) for name in _LABELS}
+        fields |= {name: np.asarray(stored[name], dtype=float) for name in ("time", *QUANTITIES)}
+        return cls(**fields)

@@ -181,7 +181,7 @@ class _Table:
             raise ModelError(f"'{key}' in {self._where} is {value!r}; expected tables, [[{key}]]")
         return [_Table(item, f"[[{key}]] number {index + 1}") for index, item in enumerate(value)]
 
-    def keys(self) -> list[str]:
+    def names(self) -> list[str]:
         return list(self._content)
 
     def done(self) -> None:
@@ -196,11 +196,11 @@ def _robot(table: _Table, folder: Path) -> Robot:
     if folder.resolve() not in urdf.resolve().parents:
         raise ModelError(f"'urdf' is '{urdf}', which is outside the robot's folder")
     joints = table.table("joints")
-    joint_names = joints.keys()
+    joint_names = joints.names()
     kindyn = KinDynComputations(urdf, joint_names)
     limits, home_joints = _joints(joints, joint_names, kindyn)
     groups = table.table("joint_groups")
-    joint_groups = {group: groups.texts(group) for group in groups.keys()}
+    joint_groups = {group: groups.texts(group) for group in groups.names()}
     for group, members in joint_groups.items():
         for member in members:
             if member not in joint_names:
@@ -210,7 +210,7 @@ def _robot(table: _Table, folder: Path) -> Robot:
     if friction <= 0:
         raise ModelError(f"'friction' is {friction}; expected a positive number")
     feet = contact.table("feet")
-    contacts = tuple(ContactPoint(frame=frame, foot=foot) for foot in feet.keys() for frame in feet.texts(foot))
+    contacts = tuple(ContactPoint(frame=frame, foot=foot) for foot in feet.names() for frame in feet.texts(foot))
     jets = _jets(table)
     for frame in (*(point.frame for point in contacts), *(jet.frame for jet in jets)):
         kindyn.tree.frame(frame)
@@ -253,7 +253,7 @@ def _jets(table: _Table) -> tuple[Jet, ...]:
     models: dict[str, JetModel] = {}
     if entries:
         known = table.table("jet_models")
-        for name in known.keys():
+        for name in known.names():
             entry = known.table(name)
             models[name] = JetModel(**{key: entry.number(key) for key in coefficients})
             entry.done()

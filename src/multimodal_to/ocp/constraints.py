@@ -190,7 +190,10 @@ def thrust_dynamics(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
 
 
 def sliding(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
-    """|t·(p_i⁺ − p_i)| n·f_i⁺ ≤ ε_t (eq. 21), with the force that acts over the interval: under backward Euler its end's."""
+    """|t·(p_i⁺ − p_i)| n·f_i⁺ ≤ ε_t (eq. 21).
+
+    The force is the one that acts over the interval: under backward Euler its end's.
+    """
     rows = []
     for index, (before, after, force) in enumerate(zip(start.points, end.points, end.forces, strict=True)):
         product = contact.sliding(world.surface, after, force, after - before)

@@ -75,6 +75,7 @@ class Problem:
     scenario: Scenario
     layout: Layout
     opti: cs.Opti
+    slack_factor: cs.MX  # Opti's parameter: what both slack weights are multiplied by while solving
     nlp: Nlp
     lower: Array  # of x
     upper: Array
@@ -97,9 +98,9 @@ class Problem:
         return report
 
     def costs(self, x: Array) -> dict[str, float]:
-        """Return each named cost's share of the objective at x."""
+        """Return each named cost's share of the objective at x, with the scenario's own weights."""
         report = dict.fromkeys(self.cost_names, 0.0)
-        for name, value in zip(self.cost_names, np.array(self.nlp.costs(x)).ravel(), strict=True):
+        for name, value in zip(self.cost_names, np.array(self.nlp.costs(x, 1.0)).ravel(), strict=True):
             report[name] += float(value)
         return report
 
@@ -127,6 +128,7 @@ def build(robot: Robot, scenario: Scenario) -> Problem:
     bounds = ranges(robot, scenario)
 
     z, z_next, dt = cs.SX.sym("z", layout.size), cs.SX.sym("z_next", layout.size), cs.SX.sym("dt")
+    slack_factor = cs.SX.sym("slack_factor")
     start, end = (Knot(robot, **layout.read(values * layout.scale)) for values in (z, z_next))
     interval = dt * INTERVAL_SCALE
     named = {
@@ -135,14 +137,13 @@ def build(robot: Robot, scenario: Scenario) -> Problem:
         + [_named(rows, start, end, interval, world) for rows in OVER_INTERVALS],
         "last": [],
     }
-    named["every"] = [
-        (name, _move_to_bounds(rows, z_next, layout, bounds)) for name, rows in named["every"]
-    ]
-    charged = _costs(start, end, interval, world, scenario.weights)
+    named["every"] = [(name, _move_to_bounds(rows, z_next, layout, bounds)) for name, rows in named["every"]]
+    charged = _costs(start, end, interval, world, scenario.weights, slack_factor)
     starts = {"first": [0], "every": range(scenario.knots), "last": [scenario.knots - 1]}
     stages = [
         Stage(
             name=name, starts=np.array(starts[name], dtype=np.int64), start=z, end=z_next, interval=dt,
+            parameter=slack_factor,
             rows=cs.vertcat(cs.SX(0, 1), *(rows.expression / rows.scale for _, rows in named[name])),
             costs=cs.vertcat(cs.SX(0, 1), *charged[name].values()),
         )
@@ -160,8 +161,9 @@ def build(robot: Robot, scenario: Scenario) -> Problem:
     )
     middle = 0.5 * (scenario.interval_min + scenario.interval_max)
     guess = np.append(straight_line(robot, scenario, standing).ravel(order="F"), middle) / scale
+    opti, factor = _opti(nlp, lower, upper, low, high)
     return Problem(
-        robot=robot, scenario=scenario, layout=layout, opti=_opti(nlp, lower, upper, low, high), nlp=nlp, lower=lower,
+        robot=robot, scenario=scenario, layout=layout, opti=opti, slack_factor=factor, nlp=nlp, lower=lower,
         upper=upper, row_lower=low, row_upper=high, rows=row_sets, scale=scale, guess=np.clip(guess, lower, upper),
         cost_names=tuple(name for stage in stages for name in charged[stage.name]),
     )  # fmt: skip
@@ -199,7 +201,9 @@ def _tighten(bounds: Bounds, layout: Layout, column: int, lower: float, upper: f
     bounds.upper[name][row, 1:] = np.minimum(bounds.upper[name][row, 1:], upper * scale)
 
 
-def _costs(start: Knot, end: Knot, dt: SX, world: World, weights: Weights) -> dict[str, dict[str, SX]]:
+def _costs(
+    start: Knot, end: Knot, dt: SX, world: World, weights: Weights, slack_factor: SX
+) -> dict[str, dict[str, SX]]:
     """Return the weighted costs by stage and name; those of zero weight are left out."""
     every: dict[str, SX] = {}
     for residual in costs.RUNNING:
@@ -209,7 +213,7 @@ def _costs(start: Knot, end: Knot, dt: SX, world: World, weights: Weights) -> di
     for residual in costs.LINEAR:
         weight = _weight(residual.__name__, world.robot, weights)
         if np.any(weight):
-            every[residual.__name__] = weight * cs.sum1(residual(start, end, dt, world))
+            every[residual.__name__] = slack_factor * weight * cs.sum1(residual(start, end, dt, world))
     last: dict[str, SX] = {}
     for residual in costs.FINAL:
         name = f"final_{residual.__name__}"
@@ -284,11 +288,11 @@ def _row_bounds(named: Sequence[tuple[list[tuple[str, Rows]], int]]) -> tuple[Ar
     return np.concatenate(low), np.concatenate(high), sets
 
 
-def _opti(nlp: Nlp, lower: Array, upper: Array, row_lower: Array, row_upper: Array) -> cs.Opti:
-    """Return the `Opti` problem: bounds first, so that they can be told from the rows."""
+def _opti(nlp: Nlp, lower: Array, upper: Array, row_lower: Array, row_upper: Array) -> tuple[cs.Opti, cs.MX]:
+    """Return the `Opti` problem and its parameter; bounds come first, so that they can be told from the rows."""
     opti = cs.Opti()
-    x = opti.variable(lower.size)
+    x, slack_factor = opti.variable(lower.size), opti.parameter()
     opti.subject_to(opti.bounded(lower, x, upper))
     opti.subject_to(opti.bounded(row_lower, nlp.rows(x), row_upper))
-    opti.minimize(nlp.objective(x))
-    return opti
+    opti.minimize(nlp.objective(x, slack_factor))
+    return opti, slack_factor

@@ -80,21 +80,38 @@ class Scenario:
     interval_min: float  # least Δt [s]
     interval_max: float  # greatest Δt [s]
     weights: Weights
-    surface: Surface = FlatGround()
+    surface: Surface = field(default_factory=FlatGround)
     friction: float | None = None  # None: the robot's own
     slack_max: float = 1.0  # bound of both slacks [N m]
+    slack_schedule: tuple[float, ...] = (0.1, 1.0)
+    """What both slack weights are multiplied by in one solve after the other, each from the last one's answer."""
     base_speed_max: float = 2.0  # of each component of the base's twist [m/s, rad/s]
     com_range: Vector3 = (1.5, 1.5, 1.5)  # the CoM's greatest distance from the world's origin, by axis [m]
     guess_thrust: float = 30.0  # of every jet in the start guess [N]
 
     def __post_init__(self) -> None:
+        self._check_numbers()
+        self._check_positions()
+        self._check_reach()
+
+    def _check_numbers(self) -> None:
         if self.knots < 3:
             raise ScenarioError(f"knots is {self.knots}; expected at least 3")
         if not (0 < self.interval_min <= self.interval_max < math.inf):
             raise ScenarioError(
-                f"interval_min {self.interval_min} s and interval_max {self.interval_max} s; "
+                f"interval_min is {self.interval_min} s and interval_max {self.interval_max} s; "
                 "expected 0 < interval_min <= interval_max"
             )
+        for label in ("slack_max", "base_speed_max", "friction"):
+            value = getattr(self, label)
+            if value is not None and not 0 < value < math.inf:
+                raise ScenarioError(f"{label} is {value}; expected a positive number")
+        if not self.slack_schedule or self.slack_schedule[-1] != 1.0 or min(self.slack_schedule) <= 0:
+            raise ScenarioError(f"slack_schedule is {self.slack_schedule}; expected positive numbers that end with 1")
+        if not 0 <= self.guess_thrust < math.inf:
+            raise ScenarioError(f"guess_thrust is {self.guess_thrust} N; expected a number of at least zero")
+
+    def _check_positions(self) -> None:
         for label in ("initial_com", "final_com", "com_range"):
             value = getattr(self, label)
             if len(value) != 3 or not all(math.isfinite(number) for number in value):
@@ -103,14 +120,6 @@ class Scenario:
             for axis, number, bound in zip("xyz", getattr(self, label), self.com_range, strict=True):
                 if abs(number) > bound:
                     raise ScenarioError(f"{label} has {axis} = {number} m, beyond com_range, {bound} m")
-        for label in ("slack_max", "base_speed_max"):
-            if not 0 < getattr(self, label) < math.inf:
-                raise ScenarioError(f"{label} is {getattr(self, label)}; expected a positive number")
-        if self.friction is not None and not 0 < self.friction < math.inf:
-            raise ScenarioError(f"friction is {self.friction}; expected a positive number")
-        if not 0 <= self.guess_thrust < math.inf:
-            raise ScenarioError(f"guess_thrust is {self.guess_thrust} N; expected a number of at least zero")
-        self._check_reach()
 
     def _check_reach(self) -> None:
         """Refuse a distance that the CoM cannot travel at the greatest base speed in the longest time."""

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from multimodal_to.errors import SolverError
 from multimodal_to.ocp.problem import Problem
 from multimodal_to.ocp.solvers import Ipopt, Status
-from multimodal_to.ocp.variables import INTERVAL_SCALE
 from multimodal_to.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -61,13 +60,42 @@ Progress = Callable[[Iterate], bool]
 def solve(problem: Problem, solver: Ipopt | None = None, progress: Progress | None = None) -> Solution:
     """Solve a problem from its start guess.
 
+    The slack weights rise along the scenario's schedule, one solve starting from the answer of the last: soft contacts
+    first find where the feet leave the ground, hard ones then settle there.
+
     Args:
         problem: from `build`.
-        solver: by default `Ipopt()`.
+        solver: by default `Ipopt()`; its limits are for all solves together.
         progress: told of every iteration; it may stop the solve by returning True.
+
+    Raises:
+        SolverError: the solver could not be run.
     """
     solver = solver or Ipopt()
-    opti, started = problem.opti, time.perf_counter()
+    started, iterations, x = time.perf_counter(), 0, problem.guess
+    for index, factor in enumerate(problem.scenario.slack_schedule):
+        seconds = max(solver.time_limit - (time.perf_counter() - started), 1e-3)
+        options = solver.options(max(solver.max_iterations - iterations, 1), seconds, warm=index > 0)
+        watcher = None if progress is None else _Watcher(problem, progress, started, iterations)
+        x, statistics = _run(problem, x, factor, options, watcher)
+        iterations += int(statistics["iter_count"])
+        message = str(statistics["return_status"])
+        status = Ipopt.status(message)
+        if status in (Status.ITERATION_LIMIT, Status.TIME_LIMIT, Status.STOPPED):
+            break
+    violations, costs = problem.largest_violations(x), problem.costs(x)
+    return Solution(
+        status=status, solver_message=message, trajectory=_trajectory(problem, x), objective=sum(costs.values()),
+        costs=costs, violations=violations, units={name: problem.unit(name) for name in violations},
+        iterations=iterations, solve_time=time.perf_counter() - started, statistics=statistics,
+    )  # fmt: skip
+
+
+def _run(
+    problem: Problem, x: Array, slack_factor: float, ipopt_options: dict[str, Any], watcher: _Watcher | None
+) -> tuple[Array, dict[str, Any]]:
+    """Run IPOPT once from x; return where it ended, answer or not, and its statistics."""
+    opti = problem.opti
     options: dict[str, Any] = {
         "print_time": False,
         "detect_simple_bounds": True,
@@ -75,19 +103,16 @@ def solve(problem: Problem, solver: Ipopt | None = None, progress: Progress | No
         "grad_f": problem.nlp.gradient,
         "hess_lag": problem.nlp.hessian,
     }
-    watcher = None
-    if progress is not None:
-        watcher = _Watcher(problem, progress, started)
+    if watcher is not None:
         options["iteration_callback"] = watcher
-    opti.solver("ipopt", options, solver.options())
-    opti.set_initial(opti.x, problem.guess)
+    opti.solver("ipopt", options, ipopt_options)
+    opti.set_initial(opti.x, x)
+    opti.set_value(problem.slack_factor, slack_factor)
+    failure: RuntimeError | None = None
     try:
         opti.solve_limited()
     except RuntimeError as error:  # how Opti says that there is no solution, and everything else
-        failure: RuntimeError | None = error
-    else:
-        failure = None
-    elapsed = time.perf_counter() - started
+        failure = error
     if watcher is not None and watcher.error is not None:
         raise watcher.error
     try:
@@ -95,16 +120,7 @@ def solve(problem: Problem, solver: Ipopt | None = None, progress: Progress | No
     except RuntimeError:  # no solver has run
         raise SolverError(f"the solver did not run: {failure}") from failure
     _check_bounds(problem, statistics)
-    x = np.array(opti.debug.value(opti.x)).ravel()
-    violations = problem.largest_violations(x)
-    costs = problem.costs(x)
-    message = str(statistics["return_status"])
-    return Solution(
-        status=Ipopt.status(message), solver_message=message, trajectory=_trajectory(problem, x),
-        objective=sum(costs.values()), costs=costs, violations=violations,
-        units={name: problem.unit(name) for name in violations}, iterations=int(statistics["iter_count"]),
-        solve_time=elapsed, statistics=statistics,
-    )  # fmt: skip
+    return np.array(opti.debug.value(opti.x)).ravel(), statistics
 
 
 def _check_bounds(problem: Problem, statistics: dict[str, Any]) -> None:
@@ -126,13 +142,14 @@ def _trajectory(problem: Problem, x: Array) -> Trajectory:
         for name, value in problem.layout.read(own[:-1].reshape(problem.layout.size, -1, order="F")).items()
     }
     dt, robot = float(own[-1]), problem.robot
+    time_grid: Array = dt * np.arange(problem.scenario.knots + 1, dtype=np.float64)
 
     def rate(name: str) -> Array:
         difference: Array = np.diff(values[name], axis=1, prepend=values[name][:, :1]) / dt
         return difference
 
     return Trajectory(
-        robot=robot.name, scenario=problem.scenario.name, time=dt * np.arange(problem.scenario.knots + 1),
+        robot=robot.name, scenario=problem.scenario.name, time=time_grid,
         joint_names=robot.joint_names, contact_names=robot.contact_names, jet_names=robot.jet_names,
         com_acceleration=rate("com_velocity"), angular_momentum_rate=rate("angular_momentum"),
         contact_force_rates=rate("contact_forces"), thrust_acceleration=rate("thrust_rate"), **values,
@@ -142,10 +159,9 @@ def _trajectory(problem: Problem, x: Array) -> Trajectory:
 class _Watcher(cs.Callback):  # type: ignore[misc]
     """CasADi's iteration callback: tells `progress` where the solve stands, and stops it when asked."""
 
-    def __init__(self, problem: Problem, progress: Progress, started: float) -> None:
+    def __init__(self, problem: Problem, progress: Progress, started: float, iteration: int) -> None:
         cs.Callback.__init__(self)
-        self._problem, self._progress, self._started = problem, progress, started
-        self._iteration = 0
+        self._problem, self._progress, self._started, self._iteration = problem, progress, started, iteration
         self.error: Exception | None = None
         self.construct("watcher")
 
@@ -161,7 +177,7 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
     def get_sparsity_in(self, index: int) -> cs.Sparsity:
         variables = self._problem.lower.size
         rows = variables + self._problem.row_lower.size  # Opti counts the bounds among them
-        sizes = {"f": 1, "x": variables, "lam_x": variables, "g": rows, "lam_g": rows}
+        sizes = {"f": 1, "x": variables, "lam_x": variables, "g": rows, "lam_g": rows, "lam_p": 1}
         return cs.Sparsity.dense(sizes.get(cs.nlpsol_out(index), 0), 1)
 
     def eval(self, arguments: list[Any]) -> list[int]:

@@ -54,6 +54,9 @@ _IPOPT_STATUS = {
 }
 
 
+_WARM_PUSH = 1e-8
+
+
 @dataclass(frozen=True, kw_only=True)
 class Ipopt:
     """IPOPT with MUMPS: a monotone barrier on exact derivatives.
@@ -67,30 +70,32 @@ class Ipopt:
     max_iterations: int = 1000
     time_limit: float = math.inf  # wall time [s]
     barrier_start: float = 0.1
+    barrier_restart: float = 1e-4  # where a solve that starts from the last one's answer begins
 
     def __post_init__(self) -> None:
-        for name in ("tolerance", "violation_tolerance", "max_iterations", "time_limit", "barrier_start"):
+        for name in self.__dataclass_fields__:
             if not getattr(self, name) > 0:
                 raise InputError(f"{name} is {getattr(self, name)}; expected a positive number")
 
-    def options(self) -> dict[str, Any]:
-        """Return IPOPT's own options."""
+    def options(self, iterations: int, seconds: float, *, warm: bool) -> dict[str, Any]:
+        """Return IPOPT's own options for a solve within a budget; a warm one starts from an answer."""
         options: dict[str, Any] = {
             "print_level": 0,
             "sb": "yes",
             "linear_solver": "mumps",
             "mumps_pivtol": 1e-8,
             "mu_strategy": "monotone",
-            "mu_init": self.barrier_start,
+            "mu_init": self.barrier_restart if warm else self.barrier_start,
             "tol": self.tolerance,
             "constr_viol_tol": self.violation_tolerance,
-            "max_iter": self.max_iterations,
-            # values of the rows are physics: let none be traded for the objective's scale
-            "nlp_scaling_method": "gradient-based",
+            "compl_inf_tol": 1.0,  # in units of the cost, whose size is a million
+            "max_iter": iterations,
             "honor_original_bounds": "yes",
         }
-        if math.isfinite(self.time_limit):
-            options["max_wall_time"] = self.time_limit
+        if math.isfinite(seconds):
+            options["max_wall_time"] = seconds
+        if warm:  # an answer touches its bounds; don't push it away from them
+            options |= dict.fromkeys(("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"), _WARM_PUSH)
         return options
 
     @staticmethod

@@ -1,0 +1,231 @@
+"""`audit`: whether a trajectory is physically true, from its arrays alone and by code that shares no solver row.
+
+Everything is recomputed in numpy from the saved quantities; only rigid-body quantities come from `robot.kindyn`, and
+CoM and angular momentum from its mass-matrix side (J_CMM), not from the recursion that the optimiser uses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from multimodal_to.derived import base_poses, contact_points, flight_phases, thrust_forces
+from multimodal_to.errors import InputError
+from multimodal_to.models.robot import Robot
+from multimodal_to.models.terrain import FlatGround, Surface
+from multimodal_to.trajectory import Array, Trajectory
+
+LOADED = 5.0
+"""A contact point carries load above this normal force [N]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One property: its worst value on the horizon, where that is, and the limit it is held to."""
+
+    name: str
+    worst: float
+    unit: str
+    knot: int
+    body: str
+    limit: float
+
+    @property
+    def holds(self) -> bool:
+        """Return whether the worst value is within the limit."""
+        return self.worst <= self.limit
+
+
+@dataclass(frozen=True, kw_only=True)
+class Audit:
+    """The findings by property, and figures that describe the motion."""
+
+    findings: tuple[Finding, ...]
+    duration: float  # [s]
+    airborne: float  # longest phase of flight [s]
+    final_thrust_over_weight: float  # vertical, at the last knot [1]
+
+    @property
+    def holds(self) -> bool:
+        """Return whether every property holds."""
+        return all(finding.holds for finding in self.findings)
+
+    def __getitem__(self, name: str) -> Finding:
+        """Return a finding by its property's name."""
+        return {finding.name: finding for finding in self.findings}[name]
+
+
+def audit(robot: Robot, trajectory: Trajectory, surface: Surface | None = None, friction: float | None = None) -> Audit:
+    """Check a trajectory against the physics of its robot.
+
+    Args:
+        robot: the robot that the trajectory is for.
+        trajectory: as loaded from its file.
+        surface: the ground; flat at height zero by default.
+        friction: Coulomb coefficient; the robot's own by default.
+
+    Raises:
+        InputError: the trajectory is for another robot.
+    """
+    for label, here, there in (
+        ("joints", robot.joint_names, trajectory.joint_names),
+        ("contact points", robot.contact_names, trajectory.contact_names),
+        ("jets", robot.jet_names, trajectory.jet_names),
+    ):
+        if here != there:
+            raise InputError(f"the {label} of the trajectory are {there}; those of {robot.name} are {here}")
+    coefficient = robot.friction if friction is None else friction
+    phases = flight_phases(trajectory)
+    carried = thrust_forces(robot, trajectory)[1][:, -1, 2].sum()
+    return Audit(
+        findings=(
+            *_kinematics(robot, trajectory),
+            *_dynamics(robot, trajectory),
+            *_integration(trajectory),
+            *_jets(robot, trajectory),
+            *_contacts(robot, trajectory, surface or FlatGround(), coefficient),
+            *_limits(robot, trajectory),
+        ),
+        duration=trajectory.duration,
+        airborne=max((end - start for start, end in phases), default=0.0),
+        final_thrust_over_weight=float(carried / robot.weight),
+    )
+
+
+def _finding(
+    name: str, unit: str, limit: float, values: Array, bodies: tuple[str, ...] = (), first: int = 0
+) -> Finding:
+    """Return the worst of values (bodies, knots from `first`), or (knots,)."""
+    table = np.atleast_2d(values)
+    if not table.size:
+        return Finding(name=name, worst=0.0, unit=unit, knot=first, body="", limit=limit)
+    row, column = np.unravel_index(int(np.argmax(table)), table.shape)
+    body = bodies[row] if bodies else ""
+    return Finding(
+        name=name, worst=float(table[row, column]), unit=unit, knot=int(column) + first, body=body, limit=limit
+    )
+
+
+def _largest(vectors: Array) -> Array:
+    """Return the largest component by absolute value of (components, knots), per knot."""
+    return np.asarray(np.abs(vectors).max(axis=0))
+
+
+def _kinematics(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+    poses, count = base_poses(trajectory), trajectory.time.size
+    side_by_side = np.hstack(list(poses))
+    com = np.array(robot.kindyn.CoM_position_fun().map(count)(side_by_side, trajectory.joint_positions))
+    matrices = np.array(robot.kindyn.centroidal_momentum_matrix_fun().map(count)(
+        side_by_side, trajectory.joint_positions)).reshape(6, count, -1)  # fmt: skip
+    velocities = np.vstack([
+        trajectory.base_linear_velocity, trajectory.base_angular_velocity, trajectory.joint_velocities
+    ])  # fmt: skip
+    momentum = np.einsum("rkc,ck->rk", matrices, velocities)
+    points = contact_points(robot, trajectory).transpose(0, 2, 1).reshape(-1, count)
+    norms = np.linalg.norm(trajectory.base_quaternion_xyzw, axis=0)
+    by_contact = np.abs(points - trajectory.contact_positions).reshape(len(robot.contacts), 3, count).max(axis=1)
+    return [
+        _finding("CoM against forward kinematics", "m", 1e-5, _largest(com - trajectory.com_position)),
+        _finding("angular momentum against J_CMM ν", "kg m²/s", 1e-4,
+                 _largest(momentum[3:] - trajectory.angular_momentum)),
+        _finding("contact points against forward kinematics", "m", 1e-5, by_contact, robot.contact_names),
+        _finding("quaternion norm", "1", 1e-6, np.abs(norms - 1)),
+    ]  # fmt: skip
+
+
+def _dynamics(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+    """Newton and Euler for the whole robot, at every knot; both rates are zero at the first."""
+    forces = trajectory.per_contact("contact_forces").transpose(0, 2, 1)
+    thrust_points, thrusts = thrust_forces(robot, trajectory)
+    acting = np.concatenate([forces, thrusts])
+    points = np.concatenate([contact_points(robot, trajectory), thrust_points])
+    linear = acting.sum(axis=0) + robot.mass * robot.gravity - robot.mass * trajectory.com_acceleration.T
+    moments = np.cross(points - trajectory.com_position.T, acting).sum(axis=0)
+    return [
+        _finding("force balance", "N", 1e-2, _largest(linear.T)),
+        _finding("moment balance", "N m", 1e-2, _largest(moments.T - trajectory.angular_momentum_rate)),
+    ]
+
+
+def _integration(trajectory: Trajectory) -> list[Finding]:
+    """Backward Euler: what a quantity gains over an interval is its rate at the end times Δt."""
+    steps = np.diff(trajectory.time)
+    findings = []
+    for name, rate, unit, limit in (
+        ("com_position", "com_velocity", "m", 1e-5),
+        ("com_velocity", "com_acceleration", "m/s", 1e-5),
+        ("angular_momentum", "angular_momentum_rate", "kg m²/s", 1e-5),
+        ("base_position", "base_linear_velocity", "m", 1e-5),
+        ("joint_positions", "joint_velocities", "rad", 1e-5),
+        ("contact_forces", "contact_force_rates", "N", 1e-3),
+        ("thrust", "thrust_rate", "N", 1e-3),
+        ("thrust_rate", "thrust_acceleration", "N/s", 1e-3),
+    ):
+        gaps = np.diff(getattr(trajectory, name), axis=1) - getattr(trajectory, rate)[:, 1:] * steps
+        findings.append(_finding(f"integration of {name}", unit, limit, _largest(gaps), first=1))
+    rotations = base_poses(trajectory)[:, :3, :3]
+    turned = rotations[1:] @ rotations[:-1].transpose(0, 2, 1)
+    gaps = turned - _rodrigues(trajectory.base_angular_velocity[:, 1:].T * steps[:, None])
+    findings.append(_finding("integration of base orientation", "rad", 1e-5, np.abs(gaps).max(axis=(1, 2)), first=1))
+    return findings
+
+
+def _rodrigues(vectors: Array) -> Array:
+    """Return the rotation matrices of rotation vectors [rad], (count, 3) → (count, 3, 3)."""
+    angles = np.linalg.norm(vectors, axis=1)[:, None, None]
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    skews = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    first = np.sinc(angles / np.pi)
+    second = 0.5 * np.sinc(angles / (2 * np.pi)) ** 2
+    return np.asarray(np.eye(3) + first * skews + second * skews @ skews)
+
+
+def _jets(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+    accelerations = np.array([
+        jet.model.acceleration(trajectory.thrust[row], trajectory.thrust_rate[row], trajectory.throttle[row])
+        for row, jet in enumerate(robot.jets)
+    ]).reshape(len(robot.jets), trajectory.time.size)  # fmt: skip
+    residuals = np.abs(accelerations - trajectory.thrust_acceleration)
+    return [_finding("thrust dynamics", "N/s²", 1e-3, residuals, robot.jet_names)]
+
+
+def _contacts(robot: Robot, trajectory: Trajectory, surface: Surface, friction: float) -> list[Finding]:
+    points = contact_points(robot, trajectory)
+    forces = trajectory.per_contact("contact_forces").transpose(0, 2, 1)
+    shape = points.shape[:2]
+    heights, normal, along, slips = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    for index in np.ndindex(*shape):
+        point = points[index]
+        tangents = np.array(surface.tangents(point))
+        heights[index] = float(surface.distance(point))
+        normal[index] = float(np.array(surface.normal(point)).ravel() @ forces[index])
+        along[index] = np.abs(tangents.T @ forces[index]).max()
+        if index[1] > 0:
+            slips[index] = np.linalg.norm(tangents.T @ (point - points[index[0], index[1] - 1]))
+    names = robot.contact_names
+    return [
+        _finding("penetration", "m", 1e-5, -heights, names),
+        _finding("pulling normal force", "N", 1e-3, -normal, names),
+        _finding("friction beyond the pyramid", "N", 1e-3, along - friction * normal, names),
+        _finding("normal force × height", "N m", 0.01, normal * heights, names),
+        _finding("slip under load", "m", 1e-3, np.where(normal > LOADED, slips, 0.0), names),
+    ]
+
+
+def _limits(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+    """How far quantities are beyond their limits; zero or less is within them."""
+    limits, jets = robot.joint_limits, robot.jets
+    joints, speeds = trajectory.joint_positions, np.abs(trajectory.joint_velocities)
+    beyond = np.maximum(joints - limits.upper[:, None], limits.lower[:, None] - joints)
+    thrust_max = np.array([jet.thrust_max for jet in jets]).reshape(-1, 1)
+    lowest = np.array([jet.throttle_min for jet in jets]).reshape(-1, 1)
+    highest = np.array([jet.throttle_max for jet in jets]).reshape(-1, 1)
+    thrust, throttle = trajectory.thrust, trajectory.throttle
+    return [
+        _finding("joint range", "rad", 1e-6, beyond, robot.joint_names),
+        _finding("joint speed", "rad/s", 1e-6, speeds - limits.speed[:, None], robot.joint_names),
+        _finding("thrust range", "N", 1e-4, np.maximum(thrust - thrust_max, -thrust), robot.jet_names),
+        _finding("throttle range", "%", 1e-4, np.maximum(throttle - highest, lowest - throttle), robot.jet_names),
+    ]

@@ -1,0 +1,263 @@
+"""The command line, `multimodal-to`: the only part of the library that prints.
+
+Exit status: 0 when done, 1 when a solve ended without an answer or an audit found something, 2 on bad input.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryFile
+from types import FrameType
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from multimodal_to.audit import Audit, audit
+from multimodal_to.errors import MultimodalError, OutputError
+from multimodal_to.models.robot import load_robot
+from multimodal_to.ocp import Ipopt, Iterate, Solution, build
+from multimodal_to.ocp import solve as run_solver
+from multimodal_to.scenarios import SCENARIOS, find
+from multimodal_to.trajectory import Trajectory
+
+app = typer.Typer(
+    name="multimodal-to",
+    help="Whole-body trajectory optimisation of robots that walk and fly.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+_out = Console(highlight=False)
+_LINE_EVERY = 5.0  # [s] between progress lines where the output is no terminal
+
+File = Annotated[Path, typer.Argument(help="Trajectory file, as `solve` writes it.")]
+RobotOption = Annotated[str, typer.Option("--robot", help="Bundled robot by name, or a robot's folder.")]
+
+
+def main() -> None:
+    """Run the command line; errors of the library end in one sentence and exit status 2."""
+    try:
+        app()
+    except MultimodalError as error:
+        Console(stderr=True, highlight=False).print(f"error: {error}", markup=False, soft_wrap=True)
+        sys.exit(2)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        _out.print(f"multimodal-to {version('multimodal-to')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    show_version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and leave.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command("list")
+def list_scenarios() -> None:
+    """List the bundled scenarios with their numbers."""
+    table = Table("scenario", "what it does", "knots", "time [s]", "CoM from [m]", "to [m]", "ends", box=None)
+    for make in SCENARIOS.values():
+        scenario = make()
+        shortest, longest = (scenario.knots * bound for bound in (scenario.interval_min, scenario.interval_max))
+        start, end = (" ".join(f"{number:g}" for number in com) for com in (scenario.initial_com, scenario.final_com))
+        table.add_row(scenario.name, scenario.title, str(scenario.knots), f"{shortest:g} to {longest:g}", start, end,
+                      scenario.terminal.value)  # fmt: skip
+    _out.print(table)
+
+
+@app.command()
+def solve(
+    name: Annotated[str, typer.Argument(help="Scenario, as `list` shows it.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder for the results; made if missing. [results/NAME]")
+    ] = None,
+    robot: RobotOption = "ironcub",
+    max_iterations: Annotated[int, typer.Option(help="Give up after so many iterations.")] = 1000,
+    time_limit: Annotated[float, typer.Option(help="Give up after so many seconds in the solver.")] = 3600.0,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Solve a scenario; write the trajectory, its plot and its replay page.
+
+    Example: multimodal-to solve take-off --output results/take-off
+    """
+    scenario = find(name)
+    solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit)
+    folder = _writable(output or Path("results") / name)
+    console = Console(highlight=False, quiet=quiet)
+    started = time.perf_counter()
+    the_robot = load_robot(robot)
+    problem = build(the_robot, scenario)
+    console.print(
+        f"{scenario.title}: {the_robot.name}, {scenario.knots} knots, {problem.lower.size} variables, "
+        f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s"
+    )
+    with _Progress(console) as progress:
+        solution = run_solver(problem, solver, progress)
+    findings = audit(the_robot, solution.trajectory, scenario.surface, scenario.friction)
+    _summarise(console, solution, findings)
+
+    from multimodal_to.plotting import plot_forces  # viewers take a second to import, other commands need none
+    from multimodal_to.replay import write_html
+
+    written = [solution.trajectory.save(folder / "trajectory.npz"), folder / "forces.png"]
+    plot_forces(the_robot, solution.trajectory).savefig(written[1], dpi=150)
+    written.append(write_html(the_robot, solution.trajectory, folder / "replay.html"))
+    for path in written:
+        console.print(f"wrote {path}", soft_wrap=True)
+    if not solution.status.solved:
+        raise typer.Exit(1)
+
+
+@app.command()
+def plot(
+    file: File,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Picture: .png, .svg or .pdf. [FILE with .png]")
+    ] = None,
+    robot: RobotOption = "",
+) -> None:
+    """Plot throttle, thrust and contact force of a trajectory.
+
+    Example: multimodal-to plot results/take-off/trajectory.npz --output forces.svg
+    """
+    trajectory = Trajectory.load(file)
+    target = output or file.with_suffix(".png")
+    if target.suffix not in (".png", ".svg", ".pdf"):
+        raise OutputError(f"'{target}' is no .png, .svg or .pdf")
+    _writable(target.parent)
+    from multimodal_to.plotting import plot_forces
+
+    plot_forces(load_robot(robot or trajectory.robot), trajectory).savefig(target, dpi=150)
+    _out.print(f"wrote {target}", soft_wrap=True)
+
+
+@app.command()
+def replay(
+    file: File,
+    html: Annotated[Path | None, typer.Option(help="Write a page that opens from disk, without a server.")] = None,
+    robot: RobotOption = "",
+) -> None:
+    """Replay a trajectory in the browser, live or as a page.
+
+    Example: multimodal-to replay results/take-off/trajectory.npz --html take-off.html
+    """
+    trajectory = Trajectory.load(file)
+    the_robot = load_robot(robot or trajectory.robot)
+    if html is not None:
+        _writable(html.parent)
+    from multimodal_to.replay import show, write_html
+
+    if html is not None:
+        _out.print(f"wrote {write_html(the_robot, trajectory, html)}", soft_wrap=True)
+        return
+    visualizer = show(the_robot, trajectory)
+    _out.print(f"replaying at {visualizer.url()}; Ctrl-C ends", soft_wrap=True)
+    visualizer.open()
+    try:
+        signal.pause()
+    except KeyboardInterrupt:
+        _out.print()
+
+
+@app.command("audit")
+def audit_file(file: File, robot: RobotOption = "") -> None:
+    """Check from the file alone whether a trajectory is physically true; exit status 1 when it is not.
+
+    Example: multimodal-to audit results/take-off/trajectory.npz
+    """
+    trajectory = Trajectory.load(file)
+    report = audit(load_robot(robot or trajectory.robot), trajectory)
+    table = Table("property", "worst", "limit", "unit", "knot", "where", "", box=None)
+    for finding in report.findings:
+        verdict = "ok" if finding.holds else "FAILS"
+        table.add_row(finding.name, f"{finding.worst:.2e}", f"{finding.limit:g}", finding.unit, str(finding.knot),
+                      finding.body, verdict)  # fmt: skip
+    _out.print(table)
+    _out.print(_describe(report))
+    raise typer.Exit(0 if report.holds else 1)
+
+
+def _writable(folder: Path) -> Path:
+    """Make a folder if it is missing and make sure that files can be written there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OutputError(f"cannot write to the folder '{folder}': {error.strerror or error}") from error
+    return folder
+
+
+def _describe(report: Audit) -> str:
+    return (
+        f"{report.duration:.2f} s, longest flight {report.airborne:.2f} s, vertical thrust at the end "
+        f"{100 * report.final_thrust_over_weight:.2f} % of the weight"
+    )
+
+
+def _summarise(console: Console, solution: Solution, report: Audit) -> None:
+    name, violation, unit = solution.largest_violation
+    console.print(
+        f"{solution.status.value}: {solution.status.advice}\n"
+        f"{solution.iterations} iterations in {solution.solve_time:.1f} s, objective {solution.objective:.6g}, largest "
+        f"violation {violation:.1e} {unit} ({name})\n{_describe(report)}",
+        soft_wrap=True,
+    )
+    failed = [finding for finding in report.findings if not finding.holds]
+    for finding in failed:
+        console.print(
+            f"audit: {finding.name} is {finding.worst:.2e} {finding.unit} at knot {finding.knot} {finding.body}, "
+            f"more than {finding.limit:g}",
+            soft_wrap=True,
+        )
+    if not failed:
+        console.print(f"audit: all {len(report.findings)} properties hold")
+
+
+class _Progress:
+    """Shows where a solve stands, and ends it cleanly on Ctrl-C."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._live = Live(console=console, transient=True, refresh_per_second=4)
+        self._interrupted = False
+        self._printed = -_LINE_EVERY
+
+    def __call__(self, iterate: Iterate) -> bool:
+        line = (
+            f"iteration {iterate.iteration:4d}   objective {iterate.objective:12.6g}   largest violation "
+            f"{iterate.violation:8.1e} {iterate.unit} ({iterate.worst})   {iterate.elapsed:5.1f} s"
+        )
+        if self._console.is_terminal:
+            self._live.update(line)
+        elif iterate.elapsed - self._printed >= _LINE_EVERY:
+            self._printed = iterate.elapsed
+            self._console.print(line, soft_wrap=True)
+        return self._interrupted
+
+    def __enter__(self) -> _Progress:
+        self._before = signal.signal(signal.SIGINT, self._interrupt)
+        if self._console.is_terminal:
+            self._live.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._console.is_terminal:
+            self._live.stop()
+        signal.signal(signal.SIGINT, self._before)
+
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        self._interrupted = True

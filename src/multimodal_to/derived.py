@@ -1,0 +1,64 @@
+"""What follows from a trajectory and its robot: poses of frames, carried weight, phases of flight."""
+
+from __future__ import annotations
+
+import casadi as cs
+import numpy as np
+
+from multimodal_to.adam import quaternion
+from multimodal_to.adam.spatial import homogeneous
+from multimodal_to.models.robot import Robot
+from multimodal_to.trajectory import Array, Trajectory
+
+FLIGHT_FORCE = 1.0
+"""Below this total vertical contact force the robot counts as flying [N]."""
+
+
+def base_poses(trajectory: Trajectory) -> Array:
+    """Return w_H_base at every knot, (knots + 1, 4, 4); quaternions are normalised first."""
+    position, rho = cs.MX.sym("p", 3), cs.MX.sym("rho", 4)
+    pose = homogeneous(quaternion.rotation_matrix(rho / cs.norm_2(rho)), position)
+    function = cs.Function("base_pose", [position, rho], [pose]).map(trajectory.time.size)
+    return _stacked(function(trajectory.base_position, trajectory.base_quaternion_xyzw))
+
+
+def frame_poses(robot: Robot, trajectory: Trajectory, frame: str) -> Array:
+    """Return w_H_frame, the world pose of a link or frame at every knot, (knots + 1, 4, 4)."""
+    function = robot.kindyn.forward_kinematics_fun(frame).map(trajectory.time.size)
+    side_by_side = np.hstack(list(base_poses(trajectory)))
+    return _stacked(function(side_by_side, trajectory.joint_positions))
+
+
+def _stacked(side_by_side: cs.DM) -> Array:
+    """Return matrices of four rows that stand side by side as (count, 4, 4)."""
+    return np.array(side_by_side).reshape(4, -1, 4).transpose(1, 0, 2)
+
+
+def contact_points(robot: Robot, trajectory: Trajectory) -> Array:
+    """Return the contact points by forward kinematics [m], (contacts, knots + 1, 3)."""
+    return np.array([frame_poses(robot, trajectory, name)[:, :3, 3] for name in trajectory.contact_names])
+
+
+def thrust_forces(robot: Robot, trajectory: Trajectory) -> tuple[Array, Array]:
+    """Return where each jet pushes [m] and with what force [N], (jets, knots + 1, 3) each, world axes."""
+    poses = [frame_poses(robot, trajectory, jet.frame) for jet in robot.jets]
+    points = np.array([pose[:, :3, 3] for pose in poses]).reshape(-1, trajectory.time.size, 3)
+    axes = np.array([pose[:, :3, 2] for pose in poses]).reshape(points.shape)
+    return points, -trajectory.thrust[:, :, None] * axes
+
+
+def vertical_thrust(robot: Robot, trajectory: Trajectory) -> Array:
+    """Return the world-vertical sum of the thrusts [N], (knots + 1,)."""
+    return np.asarray(thrust_forces(robot, trajectory)[1][:, :, 2].sum(axis=0))
+
+
+def flying(trajectory: Trajectory) -> np.ndarray:
+    """Return at which knots the total vertical contact force is below `FLIGHT_FORCE`, (knots + 1,)."""
+    return trajectory.vertical_contact_force() < FLIGHT_FORCE
+
+
+def flight_phases(trajectory: Trajectory) -> list[tuple[float, float]]:
+    """Return start and end [s] of each run of knots in flight."""
+    edges = np.concatenate(([False], flying(trajectory), [False]))
+    starts, ends = np.flatnonzero(~edges[:-1] & edges[1:]), np.flatnonzero(edges[:-1] & ~edges[1:]) - 1
+    return [(float(trajectory.time[i]), float(trajectory.time[j])) for i, j in zip(starts, ends, strict=True)]

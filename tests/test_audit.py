@@ -1,0 +1,74 @@
+"""Each property of the audit is violated on purpose, and the audit says so, where it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from multimodal_to.audit import audit
+from multimodal_to.errors import InputError
+
+KNOT = 20
+
+
+def spoil(trajectory, name, row, amount, knot=KNOT):
+    array = getattr(trajectory, name).copy()
+    array[row, knot] += amount
+    return replace(trajectory, **{name: array})
+
+
+@pytest.mark.parametrize(
+    ("property_name", "quantity", "row", "amount"),
+    [
+        ("CoM against forward kinematics", "com_position", 1, 1e-4),
+        ("angular momentum against J_CMM ν", "angular_momentum", 2, 1e-2),
+        ("contact points against forward kinematics", "contact_positions", 4, 1e-4),
+        ("quaternion norm", "base_quaternion_xyzw", 3, 1e-4),
+        ("force balance", "contact_forces", 5, 1.0),
+        ("moment balance", "contact_forces", 5, 5.0),
+        ("integration of com_velocity", "com_acceleration", 0, 1e-2),
+        ("integration of joint_positions", "joint_velocities", 7, 1e-2),
+        ("integration of base orientation", "base_angular_velocity", 0, 1e-2),
+        ("integration of thrust", "thrust_rate", 1, 1.0),
+        ("thrust dynamics", "throttle", 1, -1.0),
+        ("pulling normal force", "contact_forces", 2, -500.0),
+        ("friction beyond the pyramid", "contact_forces", 0, 100.0),
+        ("joint range", "joint_positions", 14, 3.0),
+        ("joint speed", "joint_velocities", 3, 10.0),
+        ("thrust range", "thrust", 2, 300.0),
+        ("throttle range", "throttle", 0, 50.0),
+    ],
+)
+def test_a_spoiled_quantity_is_found_where_it_is(ironcub, take_off, property_name, quantity, row, amount):
+    trajectory = take_off.trajectory
+    assert audit(ironcub, trajectory)[property_name].holds
+    finding = audit(ironcub, spoil(trajectory, quantity, row, amount))[property_name]
+    assert not finding.holds
+    assert finding.knot == KNOT
+
+
+@pytest.mark.parametrize("property_name", ["penetration", "normal force × height", "slip under load"])
+def test_a_robot_that_is_moved_under_load_is_found(ironcub, take_off, property_name):
+    row, amount = {"penetration": (2, -0.01), "normal force × height": (2, 0.01), "slip under load": (0, 0.01)}[
+        property_name
+    ]
+    report = audit(ironcub, spoil(take_off.trajectory, "base_position", row, amount))
+    assert not report[property_name].holds
+    assert report[property_name].knot in (KNOT, KNOT + 1)
+    assert not report.holds
+
+
+def test_a_trajectory_of_another_robot_is_refused(ironcub, take_off):
+    names = ("other", *take_off.trajectory.joint_names[1:])
+    with pytest.raises(InputError, match="the joints of the trajectory are"):
+        audit(ironcub, replace(take_off.trajectory, joint_names=names))
+
+
+def test_the_figures_describe_the_motion(ironcub, take_off):
+    report = audit(ironcub, take_off.trajectory)
+    assert report.duration == pytest.approx(take_off.trajectory.duration)
+    assert report.airborne >= 0.5
+    assert report.final_thrust_over_weight == pytest.approx(1.0, abs=0.01)
+    assert np.isfinite([finding.worst for finding in report.findings]).all()

@@ -1,0 +1,115 @@
+"""Every command, with good and bad input, as a person runs it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from multimodal_to.trajectory import Trajectory
+from synthetic import take_off as synthetic_take_off
+
+
+def run(*arguments, cwd=None):
+    return subprocess.run(
+        [sys.executable, "-m", "multimodal_to", *map(str, arguments)],
+        capture_output=True, text=True, cwd=cwd, timeout=300, check=False, env={**os.environ, "COLUMNS": "200"},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def file(ironcub, tmp_path_factory):
+    return synthetic_take_off(ironcub).save(tmp_path_factory.mktemp("cli") / "trajectory.npz")
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory):
+    """A solve that is given three iterations: too few for an answer."""
+    folder = tmp_path_factory.mktemp("stopped") / "new" / "folder"
+    return folder, run("solve", "take-off", "--output", folder, "--max-iterations", 3)
+
+
+def test_list_shows_the_scenarios():
+    result = run("list")
+    assert result.returncode == 0
+    assert "take-off" in result.stdout
+    assert "0 0 0.7" in result.stdout
+
+
+@pytest.mark.parametrize("command", [(), ("solve",), ("plot",), ("replay",), ("audit",), ("list",)])
+def test_help_is_short(command):
+    result = run(*command, "--help")
+    assert result.returncode == 0
+    assert len(result.stdout.splitlines()) < 40
+
+
+def test_version_is_printed():
+    assert run("--version").stdout.startswith("multimodal-to ")
+
+
+def test_a_solve_writes_trajectory_plot_and_replay_even_without_an_answer(stopped):
+    folder, result = stopped
+    assert result.returncode == 1
+    assert result.stderr == ""
+    assert "iteration limit: allow more iterations" in result.stdout
+    assert sorted(path.name for path in folder.iterdir()) == ["forces.png", "replay.html", "trajectory.npz"]
+    assert Trajectory.load(folder / "trajectory.npz").scenario == "take-off"
+
+
+def test_progress_names_iteration_objective_violation_and_time(stopped):
+    assert "iteration    0   objective" in stopped[1].stdout
+    assert "largest violation" in stopped[1].stdout
+
+
+def test_quiet_prints_nothing(tmp_path):
+    result = run("solve", "take-off", "--output", tmp_path, "--max-iterations", 1, "--quiet")
+    assert (result.stdout, result.stderr) == ("", "")
+
+
+def test_plot_and_replay_read_a_saved_file(file, tmp_path):
+    assert run("plot", file, "--output", tmp_path / "forces.svg").returncode == 0
+    assert (tmp_path / "forces.svg").read_text(encoding="utf-8").startswith("<?xml")
+    assert run("replay", file, "--html", tmp_path / "page.html").returncode == 0
+    assert (tmp_path / "page.html").stat().st_size > 800_000  # the viewer is inside
+
+
+def test_audit_says_what_fails_and_leaves_with_one(file):
+    result = run("audit", file)  # a drawn motion, not a true one
+    assert result.returncode == 1
+    assert "FAILS" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("solve", "takeoff"), "unknown scenario 'takeoff'; did you mean 'take-off'? Available: take-off"),
+        (("solve", "take-off", "--robot", "ironcup"), "unknown robot 'ironcup'; did you mean 'ironcub'?"),
+        (("solve", "take-off", "--max-iterations", "0"), "max_iterations is 0; expected a positive number"),
+        (("plot", "none.npz"), "no trajectory file 'none.npz'"),
+        (("replay", "none.npz"), "no trajectory file 'none.npz'"),
+        (("audit", "none.npz"), "no trajectory file 'none.npz'"),
+    ],
+)
+def test_bad_input_ends_in_one_sentence_and_two(tmp_path, arguments, sentence):
+    result = run(*arguments, cwd=tmp_path)
+    assert result.returncode == 2
+    assert result.stderr.count("\n") == 1
+    assert sentence in result.stderr
+    assert list(tmp_path.rglob("*.npz")) == []
+
+
+def test_a_folder_that_cannot_be_written_is_found_before_the_solve(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way")
+    result = run("solve", "take-off", "--output", blocked / "results")
+    assert result.returncode == 2
+    assert "cannot write to the folder" in result.stderr
+    assert result.stdout == ""
+
+
+def test_a_picture_of_an_unknown_kind_is_refused(file, tmp_path):
+    result = run("plot", file, "--output", tmp_path / "forces.bmp")
+    assert result.returncode == 2
+    assert "is no .png, .svg or .pdf" in result.stderr

@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+
+from multimodal_to.errors import ModelError
+from multimodal_to.models.robot import bundled_robots, load_robot
+
+
+@pytest.fixture
+def folder(tmp_path):
+    target = tmp_path / "mine"
+    shutil.copytree(bundled_robots()["ironcub"], target)
+    return target
+
+
+def edit(folder, old, new, count=1):
+    path = folder / "robot.toml"
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, count), encoding="utf-8")
+
+
+def test_the_bundled_robot_has_the_figures_of_the_ironcub(ironcub):
+    assert ironcub.mass == pytest.approx(44.741798, abs=1e-9)
+    assert len(ironcub.joint_names) == 23
+    assert len(ironcub.kindyn.tree.bodies) == 24
+    assert ironcub.contact_names == tuple(f"{side}_sole_{corner}" for side in "lr" for corner in (1, 2, 3, 4))
+    assert [jet.thrust_max for jet in ironcub.jets] == [160.0, 160.0, 220.0, 220.0]
+    assert ironcub.friction == 0.33
+    assert ironcub.joint_names[ironcub.group_indices("legs")[0]] == "l_hip_pitch"
+
+
+def test_groups_are_named_and_do_not_overlap(ironcub):
+    indices = sorted(ironcub.group_indices("upper_body") + ironcub.group_indices("legs"))
+    assert indices == list(range(23))
+
+
+def test_the_planning_range_lies_within_the_mechanical_one(ironcub):
+    for joint, lower, upper in zip(
+        ironcub.kindyn.tree.joints, ironcub.joint_limits.lower, ironcub.joint_limits.upper, strict=True
+    ):
+        assert joint.lower <= lower < upper <= joint.upper
+
+
+def test_the_standing_pose_stands_flat_on_the_ground(ironcub):
+    transform = np.eye(4)
+    transform[:3, 3] = ironcub.home.base_position
+    from multimodal_to.ocp.guess import contact_positions
+
+    heights = contact_positions(ironcub, ironcub.home).reshape(-1, 3)[:, 2]
+    assert np.abs(heights).max() < 2e-6
+
+
+def test_a_robot_is_loaded_from_its_folder(folder, ironcub):
+    assert load_robot(folder).joint_names == ironcub.joint_names
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('frame = "l_arm_jet_turbine"', 'frame = "l_arm_jet"', "unknown frame 'l_arm_jet'; did you mean"),
+        ("torso_pitch      =", "torso_pich       =", "unknown joint 'torso_pich'; did you mean 'torso_pitch'"),
+        ('model = "P160"', 'model = "P16"', "unknown jet model 'P16'; did you mean 'P160'"),
+        ("friction = 0.33", "friction = -1", "'friction' is -1.0; expected a positive number"),
+        ("friction = 0.33", "friction = nan", "expected a finite number"),
+        ("friction = 0.33", "frction = 0.33", "lacks 'friction'"),
+        ("friction = 0.33", "friction = 0.33\nmu = 1", "unknown key 'mu'"),
+        ("home = 0.379599880", "home = 3.0", "home 3.0 is not within its range"),
+        ("0.999940330]", "0.5]", "has the norm"),
+        ('urdf = "ironcub.urdf"', 'urdf = "other.urdf"', "cannot read the URDF"),
+        ('urdf = "ironcub.urdf"', 'urdf = "../../ironcub.urdf"', "outside the robot's folder"),
+        ("thrust_max = 160.0", "thrust_max = -5", "expected a positive thrust_max"),
+        ("[joints]", "[joints", "not valid TOML"),
+    ],
+)
+def test_a_broken_robot_file_says_what_is_wrong(folder, old, new, sentence):
+    edit(folder, old, new)
+    with pytest.raises(ModelError) as error:
+        load_robot(folder)
+    assert sentence in str(error.value)
+
+
+def test_an_unknown_robot_is_named_with_those_that_exist():
+    with pytest.raises(ModelError, match="unknown robot 'ironcup'; did you mean 'ironcub'"):
+        load_robot("ironcup")
+
+
+def test_an_unknown_group_is_named_with_those_that_exist(ironcub):
+    with pytest.raises(ModelError, match="unknown joint group 'leg'; did you mean"):
+        ironcub.group_indices("leg")

@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from multimodal_to import scenarios
+from multimodal_to.errors import ModelError, ScenarioError
+from multimodal_to.ocp import Weights, build
+from multimodal_to.ocp.guess import base_transform, contact_positions, standing_posture
+from multimodal_to.ocp.variables import ranges
+
+
+@pytest.fixture
+def scenario():
+    return scenarios.take_off()
+
+
+def test_the_take_off_has_the_numbers_of_the_paper(scenario):
+    assert scenario.knots == 70
+    assert (scenario.initial_com[2], scenario.final_com[2]) == (0.57, 0.70)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"knots": 2}, "knots is 2; expected at least 3"),
+        ({"interval_min": 0.2}, "expected 0 < interval_min <= interval_max"),
+        ({"final_com": (0.0, 0.0, float("nan"))}, "expected three finite numbers"),
+        ({"final_com": (0.0, 0.0, 2.0)}, "beyond com_range"),
+        ({"initial_com": (0.0, -1.6, 0.57)}, "initial_com has y = -1.6 m, beyond com_range"),
+        ({"slack_max": 0.0}, "slack_max is 0.0; expected a positive number"),
+        ({"friction": -0.1}, "friction is -0.1; expected a positive number"),
+        ({"guess_thrust": float("inf")}, "guess_thrust is inf"),
+        ({"final_com": (1.0, 0.0, 0.7), "base_speed_max": 0.1}, "faster than base_speed_max"),
+    ],
+)
+def test_numbers_that_contradict_each_other_are_refused(scenario, change, sentence):
+    with pytest.raises(ScenarioError) as error:
+        replace(scenario, **change)
+    assert sentence in str(error.value)
+
+
+def test_a_negative_weight_is_refused():
+    with pytest.raises(ScenarioError, match="weight 'thrust' is -1"):
+        Weights(thrust=-1.0)
+    with pytest.raises(ScenarioError, match="weight 'joint_velocities' is nan"):
+        Weights(joint_velocities={"legs": float("nan")})
+
+
+def test_a_weight_for_joints_that_do_not_exist_is_refused(ironcub, scenario):
+    weights = replace(scenario.weights, joint_velocities={"lgs": 1.0})
+    with pytest.raises(ModelError, match="unknown joint group 'lgs'; did you mean 'legs'"):
+        build(ironcub, replace(scenario, weights=weights))
+
+
+def test_a_start_that_no_posture_reaches_is_refused(ironcub, scenario):
+    with pytest.raises(ScenarioError, match="no posture of ironcub within its joint limits stands on the ground"):
+        build(ironcub, replace(scenario, initial_com=(0.0, 0.0, 0.75)))
+
+
+def test_a_start_that_contradicts_the_joint_limits_is_refused(ironcub, scenario):
+    upper = ironcub.joint_limits.upper.copy()
+    upper[[ironcub.joint_names.index(knee) for knee in ("l_knee", "r_knee")]] = -1.5  # kneeling
+    limits = replace(ironcub.joint_limits, upper=upper)
+    with pytest.raises(ScenarioError, match="no posture of ironcub within its joint limits"):
+        build(replace(ironcub, joint_limits=limits), scenario)
+
+
+def test_an_end_that_contradicts_the_bounds_is_refused(ironcub, scenario):
+    """A hover has to end upright; a base that may not turn so far is told which variable at which knot."""
+    bounds = ranges(ironcub, scenario)
+    bounds.lower["base_quaternion_xyzw"][0] = 0.2
+    with pytest.raises(
+        ScenarioError, match=r"base_quaternion_xyzw\[0\] has to be 0 at knot 70, outside its range 0.2 to 1"
+    ):
+        bounds.fix("base_quaternion_xyzw", scenario.knots, np.array([0.0, 0.0, 0.0, 1.0]))
+
+
+def test_an_unknown_scenario_is_named_with_those_that_exist():
+    with pytest.raises(
+        ScenarioError, match=r"unknown scenario 'takeof'; did you mean 'take-off'\? Available: take-off"
+    ):
+        scenarios.find("takeof")
+
+
+def test_the_standing_posture_stands_where_it_should(ironcub, scenario):
+    posture = standing_posture(ironcub, scenario.surface, scenario.initial_com)
+    com = np.array(ironcub.kindyn.CoM_position(base_transform(posture), posture.joint_positions)).ravel()
+    assert com == pytest.approx(scenario.initial_com, abs=1e-8)
+    heights = contact_positions(ironcub, posture)[2::3]
+    assert heights.min() > -1e-8
+    assert heights.max() < 2e-6
+    assert np.abs(posture.joint_positions - ironcub.home.joint_positions).max() < 0.2
