@@ -21,6 +21,7 @@ test: .venv/ready-dev lint
 
 lint: .venv/ready-dev
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
 clean:

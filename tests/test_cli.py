@@ -38,11 +38,21 @@ def test_list_shows_the_scenarios():
     assert "0 0 0.7" in result.stdout
 
 
-@pytest.mark.parametrize("command", [(), ("solve",), ("plot",), ("replay",), ("audit",), ("list",)])
+@pytest.mark.parametrize(
+    "command", [(), ("solve",), ("plot",), ("replay",), ("audit",), ("list",), ("robot",), ("robot", "info")]
+)
 def test_help_is_short(command):
     result = run(*command, "--help")
     assert result.returncode == 0
     assert len(result.stdout.splitlines()) < 40
+
+
+def test_robot_info_shows_the_tree_and_what_looks_wrong():
+    result = run("robot", "info", "ironcub")
+    assert result.returncode == 0
+    assert "23 moving joints" in result.stdout
+    assert "44.742 kg" in result.stdout
+    assert "joint 'l_elbow' has the effort limit 50000, which looks like a placeholder" in result.stdout
 
 
 def test_version_is_printed():
@@ -90,6 +100,8 @@ def test_audit_says_what_fails_and_leaves_with_one(file):
         (("plot", "none.npz"), "no trajectory file 'none.npz'"),
         (("replay", "none.npz"), "no trajectory file 'none.npz'"),
         (("audit", "none.npz"), "no trajectory file 'none.npz'"),
+        (("robot", "info", "none.urdf"), "unknown robot 'none.urdf'"),
+        (("robot", "info", __file__), "is not valid XML"),
     ],
 )
 def test_bad_input_ends_in_one_sentence_and_two(tmp_path, arguments, sentence):

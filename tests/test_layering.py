@@ -26,7 +26,7 @@ OCP_FLOORS = [
     {"scenario"},
     {"variables", "integrators"},
     {"constraints", "guess"},
-    {"costs"},
+    {"costs", "boundary"},
     {"transcription", "solvers"},
     {"problem"},
     {"solution"},

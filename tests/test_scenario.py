@@ -33,6 +33,7 @@ def test_the_take_off_has_the_numbers_of_the_paper(scenario):
         ({"slack_max": 0.0}, "slack_max is 0.0; expected a positive number"),
         ({"friction": -0.1}, "friction is -0.1; expected a positive number"),
         ({"guess_thrust": float("inf")}, "guess_thrust is inf"),
+        ({"slack_schedule": (0.1, 0.5)}, "expected positive numbers that end with 1"),
         ({"final_com": (1.0, 0.0, 0.7), "base_speed_max": 0.1}, "faster than base_speed_max"),
     ],
 )
@@ -44,9 +45,14 @@ def test_numbers_that_contradict_each_other_are_refused(scenario, change, senten
 
 def test_a_negative_weight_is_refused():
     with pytest.raises(ScenarioError, match="weight 'thrust' is -1"):
-        Weights(thrust=-1.0)
+        Weights(thrust=-1.0, complementarity_slack=1.0, sliding_slack=1.0)
     with pytest.raises(ScenarioError, match="weight 'joint_velocities' is nan"):
-        Weights(joint_velocities={"legs": float("nan")})
+        Weights(joint_velocities={"legs": float("nan")}, complementarity_slack=1.0, sliding_slack=1.0)
+
+
+def test_slacks_that_cost_nothing_are_refused():
+    with pytest.raises(ScenarioError, match="both slacks need a positive weight"):
+        Weights(complementarity_slack=0.0, sliding_slack=1.0)
 
 
 def test_a_weight_for_joints_that_do_not_exist_is_refused(ironcub, scenario):

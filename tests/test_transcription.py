@@ -12,6 +12,7 @@ from multimodal_to import scenarios
 from multimodal_to.ocp import Weights, build
 from multimodal_to.ocp.variables import Layout
 
+SLACKS = Weights(complementarity_slack=1.0, sliding_slack=1.0)
 ALL = {
     name: 1.0 + index
     for index, name in enumerate(Weights.__dataclass_fields__)
@@ -49,7 +50,7 @@ def test_gradient_and_jacobian_match_finite_differences(problem, point):
 
 
 def test_the_hessian_is_the_derivative_of_the_gradient_of_the_lagrangian(problem, point):
-    x, _ = point
+    x, multipliers = point
     sigma = 0.3
 
     def gradient(at):
@@ -80,8 +81,8 @@ def test_every_weight_names_a_cost_and_zero_weights_add_nothing(ironcub, problem
     names = set(problem.costs(x))
     assert names == {*ALL, "joint_velocities"}
     assert sum(problem.costs(x).values()) == pytest.approx(float(problem.nlp.objective(x, 1.0)))
-    bare = build(ironcub, replace(problem.scenario, weights=Weights(thrust=2.0)))
-    assert set(bare.cost_names) == {"thrust"}
+    bare = build(ironcub, replace(problem.scenario, weights=replace(SLACKS, thrust=2.0)))
+    assert set(bare.cost_names) == {"thrust", "complementarity_slack", "sliding_slack"}
     x[-1] = 1.0  # Δt = 0.1 s
     thrust = bare.layout.read((x * bare.scale)[:-1].reshape(bare.layout.size, -1, order="F"))["thrust"]
     assert bare.costs(x)["thrust"] == pytest.approx(2.0 * 0.1 * np.sum(thrust[:, 1:] ** 2))

@@ -9,7 +9,7 @@ from multimodal_to.adam import KinDynComputations
 from multimodal_to.audit import Audit, audit
 from multimodal_to.errors import MultimodalError
 from multimodal_to.models.robot import Robot, load_robot
-from multimodal_to.ocp import Ipopt, Problem, Scenario, Solution, Status, Terminal, Weights, build, solve
+from multimodal_to.ocp import Ipopt, Problem, Scenario, Solution, Start, Status, Terminal, Weights, build, solve
 from multimodal_to.trajectory import Trajectory
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "Robot",
     "Scenario",
     "Solution",
+    "Start",
     "Status",
     "Terminal",
     "Trajectory",

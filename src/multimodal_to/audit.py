@@ -109,7 +109,7 @@ def _finding(
 
 def _largest(vectors: Array) -> Array:
     """Return the largest component by absolute value of (components, knots), per knot."""
-    return np.asarray(np.abs(vectors).max(axis=0))
+    return np.asarray(np.abs(vectors).max(axis=0, initial=0.0))
 
 
 def _kinematics(robot: Robot, trajectory: Trajectory) -> list[Finding]:

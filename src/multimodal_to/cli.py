@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
+from multimodal_to.adam.inspection import describe
 from multimodal_to.audit import Audit, audit
 from multimodal_to.errors import MultimodalError, OutputError
 from multimodal_to.models.robot import load_robot
@@ -34,6 +35,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+robot_app = typer.Typer(help="Look at robots.", no_args_is_help=True)
+app.add_typer(robot_app, name="robot")
 _out = Console(highlight=False)
 _LINE_EVERY = 5.0  # [s] between progress lines where the output is no terminal
 
@@ -102,7 +105,8 @@ def solve(
     problem = build(the_robot, scenario)
     console.print(
         f"{scenario.title}: {the_robot.name}, {scenario.knots} knots, {problem.lower.size} variables, "
-        f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s"
+        f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s",
+        soft_wrap=True,
     )
     with _Progress(console) as progress:
         solution = run_solver(problem, solver, progress)
@@ -170,6 +174,22 @@ def replay(
         signal.pause()
     except KeyboardInterrupt:
         _out.print()
+
+
+@robot_app.command("info")
+def robot_info(
+    path: Annotated[str, typer.Argument(help="URDF file, a robot's folder, or the name of a bundled robot.")],
+) -> None:
+    """Show a robot's tree, masses and frames, what was merged or locked, and what looks wrong.
+
+    Example: multimodal-to robot info ironcub
+    """
+    if Path(path).is_file():
+        description = describe(path)
+    else:
+        the_robot = load_robot(path)
+        description = describe(the_robot.urdf, the_robot.joint_names)
+    _out.print(str(description), markup=False, soft_wrap=True)
 
 
 @app.command("audit")

@@ -23,7 +23,7 @@ def plot_forces(robot: Robot, trajectory: Trajectory) -> Figure:
     """Plot throttle [%], thrust [N] and total vertical contact force [N] over time, one panel each.
 
     Flight (`derived.FLIGHT_FORCE`) is a translucent red band; limits are dashed; beside the contact force stand the
-    weight m g and the vertical sum of the thrusts, which takes it over from the ground. Legends stand above their panels.
+    weight m g and the vertical sum of the thrusts, which takes it over from the ground. Legends stand above the panels.
     """
     figure = Figure(figsize=_SIZE, layout="constrained")
     throttle, thrust, force = figure.subplots(3, 1, sharex=True)

@@ -71,6 +71,8 @@ _PLAIN = (0.8, 0.8, 0.82, 1.0)  # colour of a visual without one
 def write_html(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
     """Write one page that plays the motion in a browser, from disk, with networking off.
 
+    Opened with ``#t=2.5`` at its address's end, it stands still at 2.5 s; ``#t=2.5&bare`` hides the panels as well.
+
     Raises:
         OutputError: the folder does not exist or cannot be written.
     """
@@ -389,6 +391,9 @@ try {
     toggle.textContent = viewer.animator.playing ? "Pause" : "Play";
     requestAnimationFrame(update);
   };
+  const asked = new URLSearchParams(location.hash.slice(1));
+  if (asked.has("t")) { slider.value = asked.get("t"); slider.oninput(); }
+  if (asked.has("bare")) { document.querySelectorAll(".panel, .dg").forEach(panel => panel.remove()); }
   update();
 } catch (error) {
   document.getElementById("caption").append("This page needs a browser with WebGL: " + error.message);

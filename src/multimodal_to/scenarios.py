@@ -20,6 +20,7 @@ def take_off() -> Scenario:
         terminal=Terminal.HOVER,
         interval_min=0.05,
         interval_max=0.10,
+        slack_schedule=(0.02, 0.2, 1.0),
         weights=Weights(
             com_acceleration=1e5,
             com_velocity=1e7,
@@ -30,8 +31,8 @@ def take_off() -> Scenario:
             contact_force_rates=1.0,
             contact_forces=5e1,
             throttle=1e-1,
-            complementarity_slack=1e5,
-            sliding_slack=1e5,
+            complementarity_slack=5e5,  # 1e5 in the paper, which can leave a force × height of 0.02 N m
+            sliding_slack=5e5,
         ),
     )
 

@@ -52,36 +52,54 @@ class Momentum:
     angular: SX
 
 
+@dataclass(frozen=True)
+class BodyMotions:
+    """Of every body, in its own axes: pose in the parent, velocity (v, ω) and momentum (l, k) at its origin."""
+
+    poses: list[Pose]
+    velocities: list[SX]
+    omegas: list[SX]
+    momenta: list[Momentum]
+
+
+def body_motions(tree: Tree, s: SX, velocity: SX, omega: SX, s_dot: SX) -> BodyMotions:
+    """Return how all bodies move when the base does with (`velocity`, `omega`), both in base axes.
+
+    Twists go outward: ω_i = Rᵀ ω + z q̇, v_i = Rᵀ (v + ω × p), and l = m v + ω × h, k = I ω + h × v.
+    """
+    poses = [Pose(cs.SX.eye(3), cs.SX.zeros(3))] + [joint_pose(body, s) for body in tree.bodies[1:]]
+    velocities, omegas = [velocity], [omega]
+    for body, pose in zip(tree.bodies[1:], poses[1:], strict=True):
+        parent, back = body.parent, pose.rotation.T
+        along_z = cs.vertcat(0, 0, s_dot[body.column])
+        omega = back @ omegas[parent]
+        velocity = back @ (velocities[parent] + cs.cross(omegas[parent], pose.translation))
+        omegas.append(omega if body.prismatic else omega + along_z)
+        velocities.append(velocity + along_z if body.prismatic else velocity)
+    momenta = []
+    for body, velocity, omega in zip(tree.bodies, velocities, omegas, strict=True):
+        mass, first, second = body.inertia.mass, body.inertia.first_moment, body.inertia.about_origin
+        momenta.append(Momentum(mass * velocity + cs.cross(omega, first), second @ omega + cs.cross(first, velocity)))
+    return BodyMotions(poses, velocities, omegas, momenta)
+
+
 def momentum_in_base(tree: Tree, s: SX, angular_velocity: SX, s_dot: SX) -> tuple[Momentum, SX]:
     """Return the momentum about the base's origin while that origin rests, and the first moment, in base axes.
 
-    `angular_velocity` is the base's, in base axes [rad/s]. Twists go outward (ω_i = Rᵀ ω + z q̇, v_i = Rᵀ (v + ω × p)),
-    momenta (l = m v + ω × h, k = I ω + h × v) and first moments come back inward.
+    `angular_velocity` is the base's, in base axes [rad/s]. Momenta and first moments of the bodies are gathered inward.
     """
-    poses = [Pose(cs.SX.eye(3), cs.SX.zeros(3))] + [joint_pose(body, s) for body in tree.bodies[1:]]
-    omegas, velocities = [angular_velocity], [cs.SX.zeros(3)]
-    for body, pose in zip(tree.bodies[1:], poses[1:], strict=True):
-        parent = body.parent
-        along_z = cs.vertcat(0, 0, s_dot[body.column])
-        omega = pose.rotation.T @ omegas[parent]
-        velocity = pose.rotation.T @ (velocities[parent] + cs.cross(omegas[parent], pose.translation))
-        omegas.append(omega if body.prismatic else omega + along_z)
-        velocities.append(velocity + along_z if body.prismatic else velocity)
-
+    bodies = body_motions(tree, s, cs.SX.zeros(3), angular_velocity, s_dot)
     masses = [body.inertia.mass for body in tree.bodies]
     moments = [body.inertia.first_moment for body in tree.bodies]
-    linear, angular = [], []
-    for body, omega, velocity in zip(tree.bodies, omegas, velocities, strict=True):
-        inertia = body.inertia
-        linear.append(inertia.mass * velocity + cs.cross(omega, inertia.first_moment))
-        angular.append(inertia.about_origin @ omega + cs.cross(inertia.first_moment, velocity))
+    linear = [momentum.linear for momentum in bodies.momenta]
+    angular = [momentum.angular for momentum in bodies.momenta]
     for index in range(len(tree.bodies) - 1, BASE, -1):
-        parent, pose = tree.bodies[index].parent, poses[index]
-        force = pose.rotation @ linear[index]
+        parent, pose = tree.bodies[index].parent, bodies.poses[index]
+        carried = pose.rotation @ linear[index]
         masses[parent] += masses[index]
         moments[parent] = moments[parent] + masses[index] * pose.translation + pose.rotation @ moments[index]
-        linear[parent] = linear[parent] + force
-        angular[parent] = angular[parent] + pose.rotation @ angular[index] + cs.cross(pose.translation, force)
+        linear[parent] = linear[parent] + carried
+        angular[parent] = angular[parent] + pose.rotation @ angular[index] + cs.cross(pose.translation, carried)
     return Momentum(linear[BASE], angular[BASE]), moments[BASE]
 
 
@@ -94,6 +112,25 @@ def centroidal_momentum(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX
     in_base = base.rotation.T @ base_twist[3:]
     momentum, first_moment = momentum_in_base(tree, s, in_base, s_dot)
     about_com = momentum.angular - cs.cross(first_moment / tree.total_mass, momentum.linear)
-    return Momentum(
-        tree.total_mass * base_twist[:3] + base.rotation @ momentum.linear, base.rotation @ about_com
-    )
+    return Momentum(tree.total_mass * base_twist[:3] + base.rotation @ momentum.linear, base.rotation @ about_com)
+
+
+def com_velocity(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX) -> SX:
+    """Return ẋ in world axes [m/s], (3, 1): the base's velocity and, over the mass, the momentum seen from it."""
+    momentum, _ = momentum_in_base(tree, s, base.rotation.T @ base_twist[3:], s_dot)
+    return base_twist[:3] + base.rotation @ (momentum.linear / tree.total_mass)
+
+
+def kinetic_energy(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX) -> SX:
+    """Return T = ½ Σ (v·l + ω·k) over the bodies [J], which is ½ νᵀ M ν."""
+    back = base.rotation.T
+    bodies = body_motions(tree, s, back @ base_twist[:3], back @ base_twist[3:], s_dot)
+    doubled = 0
+    for velocity, omega, momentum in zip(bodies.velocities, bodies.omegas, bodies.momenta, strict=True):
+        doubled += cs.dot(velocity, momentum.linear) + cs.dot(omega, momentum.angular)
+    return doubled / 2
+
+
+def potential_energy(tree: Tree, base: Pose, s: SX, gravity: SX) -> SX:
+    """Return V = −m g·x [J], zero where the CoM passes the world's origin."""
+    return -tree.total_mass * cs.dot(gravity, com_position(tree, base, s))

@@ -58,7 +58,5 @@ def log(quaternion: SX) -> SX:
     small = squared < _SMALL
     norm = cs.sqrt(cs.if_else(small, 1, squared))
     cosine = sign * scalar
-    ratio = cs.if_else(
-        small, 2 / cosine * (1 - squared / (3 * cosine**2)), 2 * cs.atan2(norm, cosine) / norm
-    )
+    ratio = cs.if_else(small, 2 / cosine * (1 - squared / (3 * cosine**2)), 2 * cs.atan2(norm, cosine) / norm)
     return sign * ratio * vector

@@ -60,9 +60,7 @@ class Inertia:
 
     def rotated(self, rotation: SX) -> Inertia:
         """Return the same body in axes rotated by R: m, R h, R I Rᵀ."""
-        return Inertia(
-            self.mass, rotation @ self.first_moment, symmetric(rotation @ (self.about_origin @ rotation.T))
-        )
+        return Inertia(self.mass, rotation @ self.first_moment, symmetric(rotation @ (self.about_origin @ rotation.T)))
 
     def rotated_about_z(self, cosine: SX, sine: SX) -> Inertia:
         """Return the same body in axes rotated by Rz(q), with as few operations as there are.
@@ -81,9 +79,7 @@ class Inertia:
         return Inertia(
             self.mass,
             cs.vertcat(cosine * first[0] - sine * first[1], sine * first[0] + cosine * first[1], first[2]),
-            cs.vertcat(
-                cs.horzcat(kept + xx, xy, xz), cs.horzcat(xy, kept + yy, yz), cs.horzcat(xz, yz, inertia[2, 2])
-            ),
+            cs.vertcat(cs.horzcat(kept + xx, xy, xz), cs.horzcat(xy, kept + yy, yz), cs.horzcat(xz, yz, inertia[2, 2])),
         )
 
     def shifted(self, offset: SX) -> Inertia:

@@ -6,7 +6,7 @@ import math
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -86,6 +86,18 @@ class Robot:
     def weight(self) -> float:
         """Return m |g| [N]."""
         return self.mass * float(np.linalg.norm(self.gravity))
+
+    def with_jets(self, names: Sequence[str]) -> Robot:
+        """Return the robot with only the jets of these names, in this order; with none it has none to use.
+
+        Raises:
+            ModelError: there is no such jet.
+        """
+        known = {jet.name: jet for jet in self.jets}
+        for name in names:
+            if name not in known:
+                raise ModelError(unknown("jet", name, known))
+        return replace(self, jets=tuple(known[name] for name in names))
 
     def group_indices(self, group: str) -> list[int]:
         """Return where the joints of a named group stand in s.

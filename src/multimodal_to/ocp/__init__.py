@@ -1,8 +1,20 @@
 """The optimal control problem: scenarios, variables, constraints and costs, their transcription, and its solution."""
 
 from multimodal_to.ocp.problem import Problem, build
-from multimodal_to.ocp.scenario import Scenario, Terminal, Weights
+from multimodal_to.ocp.scenario import Scenario, Start, Terminal, Weights
 from multimodal_to.ocp.solution import Iterate, Solution, solve
 from multimodal_to.ocp.solvers import Ipopt, Status
 
-__all__ = ["Ipopt", "Iterate", "Problem", "Scenario", "Solution", "Status", "Terminal", "Weights", "build", "solve"]
+__all__ = [
+    "Ipopt",
+    "Iterate",
+    "Problem",
+    "Scenario",
+    "Solution",
+    "Start",
+    "Status",
+    "Terminal",
+    "Weights",
+    "build",
+    "solve",
+]

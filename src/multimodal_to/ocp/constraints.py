@@ -17,7 +17,7 @@ from multimodal_to.adam.kinematics import forward_kinematics
 from multimodal_to.adam.spatial import SX
 from multimodal_to.models import contact
 from multimodal_to.models.centroidal import momentum_rate, thrust_force
-from multimodal_to.models.robot import Robot
+from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Surface
 from multimodal_to.ocp.integrators import gap, rotation_gap
 from multimodal_to.ocp.variables import CONTACT_REACH, JET_REACH, Knot
@@ -30,6 +30,7 @@ class World:
     robot: Robot
     surface: Surface
     friction: float
+    standing: Posture  # near home, with the CoM where the motion starts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +43,9 @@ class Rows:
     unit: str
     scale: float = 1.0
 
+
+ON_GROUND = 1e-5
+"""Largest height of a contact point that stands [m]: a sole has more corners than a plane needs."""
 
 KnotRows = Callable[[Knot, World], Rows]
 IntervalRows = Callable[[Knot, Knot, SX, World], Rows]
@@ -129,13 +133,29 @@ def jet_reach(knot: Knot, world: World) -> Rows:
          - knot.com_position) / cs.DM(JET_REACH)
         for jet in world.robot.jets
     ]  # fmt: skip
-    return Rows(expression=cs.vertcat(*arms), lower=-1.0, upper=1.0, unit="1")
+    return Rows(expression=cs.vertcat(cs.SX(0, 1), *arms), lower=-1.0, upper=1.0, unit="1")
 
 
 def static_equilibrium(knot: Knot, world: World) -> Rows:
     """0 = m g + Σ f and 0 = Σ (p − x) × f: the forces hold the robot where it stands; no rate is left at knot 0."""
     linear, angular = _momentum_rate(knot, world)
     return _equal(cs.vertcat(linear, angular), "N, N m", scale=50.0)
+
+
+def steady_thrust(knot: Knot, world: World) -> Rows:
+    """0 = f(T, 0) + g(T, 0, u): the throttle holds the thrust; no rate is left at knot 0 (eq. 23)."""
+    return _equal(_thrust_acceleration(knot, world), "N/s²", scale=50.0)
+
+
+def unit_quaternion(knot: Knot, world: World) -> Rows:
+    """|ρ|² = 1 where the orientation is found; later knots inherit it through their integration."""
+    return _equal(cs.sumsqr(knot.base_quaternion_xyzw) - 1, "1")
+
+
+def standing_height(knot: Knot, world: World) -> Rows:
+    """0 ≤ d(p_i) ≤ ON_GROUND: every contact point stands."""
+    rows = non_penetration(knot, world)
+    return Rows(expression=rows.expression, lower=0.0, upper=ON_GROUND, unit="m")
 
 
 # -------------------------------------------------------------------- over an interval
@@ -182,11 +202,7 @@ def thrust_integration(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
 
 def thrust_dynamics(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
     """Ṫ⁺ = Ṫ + (f(T⁺, Ṫ⁺) + g(T⁺, Ṫ⁺, u⁺)) Δt (eq. 23, 26b)."""
-    accelerations = [
-        jet.model.acceleration(end.thrust[index], end.thrust_rate[index], end.throttle[index])
-        for index, jet in enumerate(world.robot.jets)
-    ]
-    return _equal(gap(start.thrust_rate, end.thrust_rate, cs.vertcat(*accelerations), dt), "N/s", scale=50.0)
+    return _equal(gap(start.thrust_rate, end.thrust_rate, _thrust_acceleration(end, world), dt), "N/s", scale=50.0)
 
 
 def sliding(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
@@ -200,6 +216,14 @@ def sliding(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
         slack = end.sliding_slack[index]
         rows += [product - slack, -product - slack]
     return Rows(expression=cs.vertcat(*rows), lower=-np.inf, upper=0.0, unit="N m", scale=1.0)
+
+
+def _thrust_acceleration(knot: Knot, world: World) -> SX:
+    accelerations = [
+        jet.model.acceleration(knot.thrust[index], knot.thrust_rate[index], knot.throttle[index])
+        for index, jet in enumerate(world.robot.jets)
+    ]
+    return cs.vertcat(cs.SX(0, 1), *accelerations)
 
 
 def _momentum_rate(knot: Knot, world: World) -> tuple[SX, SX]:

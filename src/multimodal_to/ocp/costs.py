@@ -55,8 +55,13 @@ def joint_velocities(start: Knot, end: Knot, dt: SX, world: World) -> SX:
 
 
 def posture(start: Knot, end: Knot, dt: SX, world: World) -> SX:
-    """s − s̄, with the robot's home posture as s̄."""
-    return end.joint_positions - cs.DM(world.robot.home.joint_positions)
+    """s − s̄, with the posture in which the robot stands at the start as s̄."""
+    return end.joint_positions - cs.DM(world.standing.joint_positions)
+
+
+def initial_posture(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+    """s − s̄ at the interval's start."""
+    return start.joint_positions - cs.DM(world.standing.joint_positions)
 
 
 def base_orientation(start: Knot, end: Knot, dt: SX, world: World) -> SX:
@@ -116,4 +121,4 @@ RUNNING: tuple[Residual, ...] = (
     throttle,
 )
 LINEAR: tuple[Residual, ...] = (complementarity_slack, sliding_slack)
-FINAL: tuple[Residual, ...] = (com_velocity, com_acceleration, angular_momentum, angular_momentum_rate)
+FINAL: tuple[Residual, ...] = (posture, com_velocity, com_acceleration, angular_momentum, angular_momentum_rate)

@@ -85,7 +85,7 @@ def straight_line(robot: Robot, scenario: Scenario, standing: Posture) -> Array:
     """Return the start guess of every knot, (layout size, N + 1), in the variables' own units.
 
     The standing posture moves with the CoM on the straight line from start to end (contact points in x and y only),
-    every jet at `guess_thrust`, everything else at zero.
+    every jet at `guess_thrust`, vertical contact forces at `guess_contact_load`, everything else at zero.
     """
     layout = Layout.of(robot)
     knots = scenario.knots + 1
@@ -100,5 +100,7 @@ def straight_line(robot: Robot, scenario: Scenario, standing: Posture) -> Array:
     view["joint_positions"][:] = standing.joint_positions[:, None]
     points = contact_positions(robot, standing)[:, None]
     view["contact_positions"][:] = points + np.tile(along_ground, (len(robot.contacts), 1))
-    view["thrust"][:] = np.minimum(scenario.guess_thrust, [[jet.thrust_max] for jet in robot.jets] or np.zeros((0, 1)))
+    thrust = np.minimum(scenario.guess_thrust, [jet.thrust_max for jet in robot.jets])
+    view["thrust"][:] = thrust[:, None]
+    view["contact_forces"][2::3] = scenario.guess_contact_load * robot.weight / len(robot.contacts)
     return guess

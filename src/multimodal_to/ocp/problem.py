@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as cs
 import numpy as np
@@ -13,17 +13,15 @@ from multimodal_to.adam.spatial import SX
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.ocp import constraints, costs
+from multimodal_to.ocp.boundary import END_ROWS, START_ROWS, set_boundary
 from multimodal_to.ocp.constraints import IntervalRows, KnotRows, Rows, World
-from multimodal_to.ocp.guess import contact_positions, standing_posture, straight_line
-from multimodal_to.ocp.scenario import Scenario, Terminal, Weights
+from multimodal_to.ocp.guess import standing_posture, straight_line
+from multimodal_to.ocp.scenario import Scenario, Start, Terminal, Weights
 from multimodal_to.ocp.transcription import Nlp, Stage, assemble
 from multimodal_to.ocp.variables import INTERVAL_SCALE, Bounds, Knot, Layout, ranges
 from multimodal_to.trajectory import QUANTITIES
 
 Array = NDArray[np.float64]
-
-AT_START: tuple[KnotRows, ...] = (constraints.friction_pyramid, constraints.static_equilibrium)
-"""Rows of knot 0, whose posture is given: what its forces have to be."""
 
 AT_KNOTS: tuple[KnotRows, ...] = (
     constraints.com_kinematics,
@@ -35,7 +33,7 @@ AT_KNOTS: tuple[KnotRows, ...] = (
     constraints.contact_reach,
     constraints.jet_reach,
 )
-"""Rows of every knot after that."""
+"""Rows of every knot but the first."""
 
 OVER_INTERVALS: tuple[IntervalRows, ...] = (
     constraints.momentum_dynamics,
@@ -48,11 +46,6 @@ OVER_INTERVALS: tuple[IntervalRows, ...] = (
     constraints.sliding,
 )
 """Rows of every interval."""
-
-_RESIDUAL_FORCE = 0.01
-"""Largest contact force component left at a knot that has to be free of contact [N]."""
-_UPRIGHT = 1e-3
-"""How far the base's quaternion may be from upright at the end [1]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,31 +111,39 @@ def build(robot: Robot, scenario: Scenario) -> Problem:
     Raises:
         ScenarioError: the scenario contradicts itself or does not fit the robot.
     """
+    if not scenario.jets:
+        robot = robot.with_jets(())
     if not robot.contacts:
         raise ScenarioError(f"{robot.name} has no contact points to stand on")
     for group in scenario.weights.joint_velocities:
         robot.group_indices(group)
     layout = Layout.of(robot)
-    world = World(robot=robot, surface=scenario.surface, friction=scenario.friction or robot.friction)
-    standing = standing_posture(robot, scenario.surface, scenario.initial_com)
+    standing = _standing(robot, scenario)
+    world = World(
+        robot=robot, surface=scenario.surface, friction=scenario.friction or robot.friction, standing=standing
+    )
     bounds = ranges(robot, scenario)
 
     z, z_next, dt = cs.SX.sym("z", layout.size), cs.SX.sym("z_next", layout.size), cs.SX.sym("dt")
     slack_factor = cs.SX.sym("slack_factor")
     start, end = (Knot(robot, **layout.read(values * layout.scale)) for values in (z, z_next))
     interval = dt * INTERVAL_SCALE
+    starts = {
+        "first": np.array([0]), "every": np.arange(scenario.knots), "last": np.array([scenario.knots - 1])
+    }  # fmt: skip
+    at_start = _named(START_ROWS[scenario.start], start, world)
+    at_knots = _named(AT_KNOTS, end, world)
+    at_end = _named(END_ROWS[scenario.terminal], end, world)
+    over_intervals = _named(OVER_INTERVALS, start, end, interval, world)
     named = {
-        "first": [_named(rows, start, world) for rows in AT_START],
-        "every": [_named(rows, end, world) for rows in AT_KNOTS]
-        + [_named(rows, start, end, interval, world) for rows in OVER_INTERVALS],
-        "last": [],
+        "first": _move_to_bounds(at_start, z, layout, bounds, starts["first"]),
+        "every": _move_to_bounds(at_knots, z_next, layout, bounds, starts["every"] + 1) + over_intervals,
+        "last": _move_to_bounds(at_end, z_next, layout, bounds, starts["last"] + 1),
     }
-    named["every"] = [(name, _move_to_bounds(rows, z_next, layout, bounds)) for name, rows in named["every"]]
     charged = _costs(start, end, interval, world, scenario.weights, slack_factor)
-    starts = {"first": [0], "every": range(scenario.knots), "last": [scenario.knots - 1]}
     stages = [
         Stage(
-            name=name, starts=np.array(starts[name], dtype=np.int64), start=z, end=z_next, interval=dt,
+            name=name, starts=starts[name], start=z, end=z_next, interval=dt,
             parameter=slack_factor,
             rows=cs.vertcat(cs.SX(0, 1), *(rows.expression / rows.scale for _, rows in named[name])),
             costs=cs.vertcat(cs.SX(0, 1), *charged[name].values()),
@@ -151,7 +152,7 @@ def build(robot: Robot, scenario: Scenario) -> Problem:
         if named[name] or charged[name]
     ]  # fmt: skip
     nlp = assemble(stages, layout.size, scenario.knots)
-    _boundary(bounds, robot, scenario, standing)
+    set_boundary(bounds, robot, scenario, standing)
 
     low, high, row_sets = _row_bounds([(named[stage.name], stage.repeats) for stage in stages])
     scale = np.append(np.tile(layout.scale, scenario.knots + 1), INTERVAL_SCALE)
@@ -169,36 +170,47 @@ def build(robot: Robot, scenario: Scenario) -> Problem:
     )  # fmt: skip
 
 
-def _named(function: Callable[..., Rows], *arguments: object) -> tuple[str, Rows]:
-    return function.__name__, function(*arguments)
+def _named(functions: Sequence[Callable[..., Rows]], *arguments: object) -> list[tuple[str, Rows]]:
+    """Return the rows of each function with its name; a robot without jets has none of theirs."""
+    rows = [(function.__name__, function(*arguments)) for function in functions]
+    return [(name, some) for name, some in rows if some.expression.shape[0]]
 
 
-def _move_to_bounds(rows: Rows, z: SX, layout: Layout, bounds: Bounds) -> Rows:
-    """Turn rows that are a single variable of the end knot, up to a constant, into bounds; return the others."""
-    jacobian = cs.sparsify(cs.jacobian(rows.expression, z))
-    everything = cs.symvar(rows.expression)
-    other = cs.vertcat(*(symbol for symbol in everything if not cs.depends_on(z, symbol)), cs.SX(0, 1))
-    kept = []
-    for index in range(rows.expression.shape[0]):
-        entry, row = rows.expression[index], jacobian[index, :]
-        single = row.nnz() == 1 and row.nonzeros()[0].is_constant() and not cs.depends_on(entry, other)
-        if not single:
-            kept.append(entry)
-            continue
-        column, slope = row.sparsity().get_col()[0], float(row.nonzeros()[0])
-        constant = float(cs.substitute(entry, z, cs.DM.zeros(z.shape[0])))
-        limits = sorted((limit - constant) / slope for limit in (rows.lower, rows.upper))
-        _tighten(bounds, layout, column, *limits)
-    return Rows(expression=cs.vertcat(cs.SX(0, 1), *kept), lower=rows.lower, upper=rows.upper, unit=rows.unit,
-                scale=rows.scale)  # fmt: skip
+def _move_to_bounds(
+    named: list[tuple[str, Rows]], z: SX, layout: Layout, bounds: Bounds, knots: NDArray[np.int64]
+) -> list[tuple[str, Rows]]:
+    """Turn rows that are a single variable, up to a constant, into its bounds at `knots`; return the others."""
+    left = []
+    for label, rows in named:
+        jacobian, kept = cs.sparsify(cs.jacobian(rows.expression, z)), [cs.SX(0, 1)]
+        for index in range(rows.expression.shape[0]):
+            entry, row = rows.expression[index], jacobian[index, :]
+            if row.nnz() != 1 or not row.nonzeros()[0].is_constant():
+                kept.append(entry)
+                continue
+            slope = float(row.nonzeros()[0])
+            constant = float(cs.substitute(entry, z, cs.DM.zeros(z.shape[0])))
+            low, high = sorted((limit - constant) / slope for limit in (rows.lower, rows.upper))
+            _tighten(bounds, layout, row.sparsity().get_col()[0], low, high, knots)
+        if sum(entry.shape[0] for entry in kept):
+            left.append((label, replace(rows, expression=cs.vertcat(*kept))))
+    return left
 
 
-def _tighten(bounds: Bounds, layout: Layout, column: int, lower: float, upper: float) -> None:
+def _tighten(bounds: Bounds, layout: Layout, column: int, lower: float, upper: float, knots: NDArray[np.int64]) -> None:
     name = next(name for name, rows in layout.rows.items() if rows.start <= column < rows.stop)
-    row = column - layout.rows[name].start
-    scale = layout.scale[column]
-    bounds.lower[name][row, 1:] = np.maximum(bounds.lower[name][row, 1:], lower * scale)
-    bounds.upper[name][row, 1:] = np.minimum(bounds.upper[name][row, 1:], upper * scale)
+    row, scale = column - layout.rows[name].start, layout.scale[column]
+    bounds.lower[name][row, knots] = np.maximum(bounds.lower[name][row, knots], lower * scale)
+    bounds.upper[name][row, knots] = np.minimum(bounds.upper[name][row, knots], upper * scale)
+
+
+def _standing(robot: Robot, scenario: Scenario) -> Posture:
+    """Return the posture in which the robot stands where the motion starts or, if in the air, where it ends."""
+    if scenario.start is Start.STANDING:
+        return standing_posture(robot, scenario.surface, scenario.initial_com)
+    if scenario.terminal is Terminal.STANDING:
+        return standing_posture(robot, scenario.surface, scenario.final_com)
+    return robot.home
 
 
 def _costs(
@@ -220,8 +232,13 @@ def _costs(
         weight = _weight(name, world.robot, weights)
         if np.any(weight):
             last[name] = _weighted_square(weight, residual(start, end, dt, world))
-    first = {"contact_forces": _weighted_square(weights.contact_forces, start.contact_forces) * dt}
-    return {"first": first if weights.contact_forces else {}, "every": every, "last": last}
+    first: dict[str, SX] = {}
+    if weights.contact_forces:
+        first["contact_forces"] = _weighted_square(weights.contact_forces, start.contact_forces) * dt
+    if weights.initial_posture:
+        residual = costs.initial_posture(start, end, dt, world)
+        first["initial_posture"] = _weighted_square(weights.initial_posture, residual)
+    return {"first": first, "every": every, "last": last}
 
 
 def _weight(name: str, robot: Robot, weights: Weights) -> float | Array:
@@ -239,33 +256,6 @@ def _weighted_square(weight: float | Array, residual: SX) -> SX:
     return cs.dot(cs.DM(weight) * residual, residual)
 
 
-def _boundary(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture) -> None:
-    """Hold the start in standing equilibrium and the end as the scenario's terminal mode says."""
-    fix = bounds.fix
-    fix("com_position", 0, np.array(scenario.initial_com))
-    fix("base_position", 0, standing.base_position)
-    fix("base_quaternion_xyzw", 0, standing.base_quaternion_xyzw)
-    fix("joint_positions", 0, standing.joint_positions)
-    fix("contact_positions", 0, contact_positions(robot, standing))
-    for name in ("com_velocity", "angular_momentum", "base_linear_velocity", "base_angular_velocity",
-                 "joint_velocities", "complementarity_slack", "sliding_slack", "thrust", "thrust_rate"):  # fmt: skip
-        fix(name, 0, 0.0)
-    idle = [np.clip(jet.model.steady_throttle(0.0), jet.throttle_min, jet.throttle_max) for jet in robot.jets]
-    fix("throttle", 0, np.array(idle))
-
-    last = scenario.knots
-    fix("com_position", last, np.array(scenario.final_com))
-    if scenario.terminal is Terminal.HOVER:
-        # Velocities at the last knot hold its CoM velocity and angular momentum too; these at the knot before make the
-        # accelerations over the last interval zero.
-        for name in ("base_linear_velocity", "base_angular_velocity", "joint_velocities", "thrust_rate"):
-            fix(name, last, 0.0)
-        for name in ("com_velocity", "angular_momentum", "thrust_rate"):
-            fix(name, last - 1, 0.0)
-        fix("contact_forces", last, 0.0, within=_RESIDUAL_FORCE)
-        fix("base_quaternion_xyzw", last, np.array([0.0, 0.0, 0.0, 1.0]), within=_UPRIGHT)
-
-
 def _row_bounds(named: Sequence[tuple[list[tuple[str, Rows]], int]]) -> tuple[Array, Array, dict[str, RowSet]]:
     """Return the bounds of g in solver units, and where each name's rows are."""
     low, high, sets, first = list[Array](), list[Array](), dict[str, RowSet](), 0
@@ -274,8 +264,6 @@ def _row_bounds(named: Sequence[tuple[list[tuple[str, Rows]], int]]) -> tuple[Ar
         lower, upper, offset = np.zeros(height), np.zeros(height), 0
         for name, rows in rows_of_stage:
             count = rows.expression.shape[0]
-            if not count:
-                continue
             here = slice(offset, offset + count)
             lower[here], upper[here] = rows.lower / rows.scale, rows.upper / rows.scale
             index = (first + np.arange(offset, offset + count)[:, None] + height * np.arange(repeats)).ravel()

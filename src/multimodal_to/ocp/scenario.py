@@ -14,11 +14,22 @@ from multimodal_to.models.terrain import FlatGround, Surface
 Vector3 = tuple[float, float, float]
 
 
+class Start(Enum):
+    """How a motion starts."""
+
+    STANDING = "standing"
+    """In a posture near home with every contact point on the ground, held by contact forces; jets idle."""
+    HOVER = "hover"
+    """At rest in the air, in a posture that is found: no contact force, steady thrusts carry the weight."""
+
+
 class Terminal(Enum):
     """How a motion ends."""
 
     HOVER = "hover"
     """At rest in the air: nothing moves, no contact force, the thrusts carry the weight and hold still."""
+    STANDING = "standing"
+    """At rest with every contact point on the ground; jets may still be spooling down."""
     FREE = "free"
     """Only the final CoM is asked for; the final costs pull the rest towards equilibrium."""
 
@@ -44,8 +55,10 @@ class Weights:
     thrust: float = 0.0  # T [N]
     thrust_rate: float = 0.0  # Ṫ [N/s]
     throttle: float = 0.0  # u [%]
-    complementarity_slack: float = 0.0  # ε_n [N m], linear
-    sliding_slack: float = 0.0  # ε_t [N m], linear
+    complementarity_slack: float  # ε_n [N m], linear
+    sliding_slack: float  # ε_t [N m], linear
+    initial_posture: float = 0.0  # s − s̄ at the first knot, where it is found
+    final_posture: float = 0.0  # s − the standing posture, at the last knot
     final_com_velocity: float = 0.0
     final_com_acceleration: float = 0.0
     final_angular_momentum: float = 0.0
@@ -57,15 +70,19 @@ class Weights:
             for number in value.values() if isinstance(value, Mapping) else (value,):
                 if not (math.isfinite(number) and number >= 0):
                     raise ScenarioError(f"weight '{entry.name}' is {number}; expected a number of at least zero")
+        if not (self.complementarity_slack > 0 and self.sliding_slack > 0):
+            raise ScenarioError("both slacks need a positive weight; without one, forces act in the air and feet slide")
         object.__setattr__(self, "joint_velocities", MappingProxyType(dict(self.joint_velocities)))
+
+    @property
+    def largest_slack(self) -> float:
+        """Return the larger of the two slack weights."""
+        return max(self.complementarity_slack, self.sliding_slack)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
     """A task: where the CoM starts and ends, in how many knots and how much time, and the weights.
-
-    The robot starts standing still in equilibrium: a posture near home with both soles on the ground and the CoM at
-    `initial_com`, contact forces that hold the weight, no thrust.
 
     Raises:
         ScenarioError: numbers that contradict each other.
@@ -76,7 +93,10 @@ class Scenario:
     knots: int  # N, the number of intervals
     initial_com: Vector3  # [m]
     final_com: Vector3  # [m]
+    start: Start = Start.STANDING
     terminal: Terminal
+    mid_height_min: float | None = None  # least height of the CoM at mid-horizon [m]
+    jets: bool = True  # False: the robot leaves them off, and the problem has none
     interval_min: float  # least Δt [s]
     interval_max: float  # greatest Δt [s]
     weights: Weights
@@ -88,6 +108,7 @@ class Scenario:
     base_speed_max: float = 2.0  # of each component of the base's twist [m/s, rad/s]
     com_range: Vector3 = (1.5, 1.5, 1.5)  # the CoM's greatest distance from the world's origin, by axis [m]
     guess_thrust: float = 30.0  # of every jet in the start guess [N]
+    guess_contact_load: float = 0.0  # share of the weight that contact forces hold in the start guess [1]
 
     def __post_init__(self) -> None:
         self._check_numbers()

@@ -72,10 +72,12 @@ def solve(problem: Problem, solver: Ipopt | None = None, progress: Progress | No
         SolverError: the solver could not be run.
     """
     solver = solver or Ipopt()
+    softest = problem.scenario.weights.largest_slack * problem.scenario.slack_schedule[0]
     started, iterations, x = time.perf_counter(), 0, problem.guess
     for index, factor in enumerate(problem.scenario.slack_schedule):
         seconds = max(solver.time_limit - (time.perf_counter() - started), 1e-3)
-        options = solver.options(max(solver.max_iterations - iterations, 1), seconds, warm=index > 0)
+        left = max(solver.max_iterations - iterations, 1)
+        options = solver.options(softest, left, seconds, warm=index > 0)
         watcher = None if progress is None else _Watcher(problem, progress, started, iterations)
         x, statistics = _run(problem, x, factor, options, watcher)
         iterations += int(statistics["iter_count"])
@@ -181,6 +183,13 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
         return cs.Sparsity.dense(sizes.get(cs.nlpsol_out(index), 0), 1)
 
     def eval(self, arguments: list[Any]) -> list[int]:
+        try:
+            return [int(bool(self._progress(self._iterate(arguments))))]
+        except Exception as error:  # it is raised once the solver has returned
+            self.error = error
+            return [1]
+
+    def _iterate(self, arguments: list[Any]) -> Iterate:
         values = dict(zip((cs.nlpsol_out(index) for index in range(len(arguments))), arguments, strict=True))
         x = np.array(values["x"]).ravel()
         violations = self._problem.largest_violations(x)
@@ -190,8 +199,4 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
             unit=self._problem.unit(worst), elapsed=time.perf_counter() - self._started,
         )  # fmt: skip
         self._iteration += 1
-        try:
-            return [int(bool(self._progress(iterate)))]
-        except Exception as error:  # it is raised once the solver has returned
-            self.error = error
-            return [1]
+        return iterate

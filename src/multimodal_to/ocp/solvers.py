@@ -69,6 +69,11 @@ class Ipopt:
     violation_tolerance: float = 1e-7  # on the rows, in solver units
     max_iterations: int = 1000
     time_limit: float = math.inf  # wall time [s]
+    slack_cost: float = 7.5
+    """What 1 N m of slack costs in the solver's eyes in the first solve of a schedule: the scale of the objective.
+
+    With an objective that weighs more, the barrier gives way to it and feasibility takes hundreds of iterations.
+    """
     barrier_start: float = 0.1
     barrier_restart: float = 1e-4  # where a solve that starts from the last one's answer begins
 
@@ -77,7 +82,7 @@ class Ipopt:
             if not getattr(self, name) > 0:
                 raise InputError(f"{name} is {getattr(self, name)}; expected a positive number")
 
-    def options(self, iterations: int, seconds: float, *, warm: bool) -> dict[str, Any]:
+    def options(self, slack_weight: float, iterations: int, seconds: float, *, warm: bool) -> dict[str, Any]:
         """Return IPOPT's own options for a solve within a budget; a warm one starts from an answer."""
         options: dict[str, Any] = {
             "print_level": 0,
@@ -90,6 +95,8 @@ class Ipopt:
             "constr_viol_tol": self.violation_tolerance,
             "compl_inf_tol": 1.0,  # in units of the cost, whose size is a million
             "max_iter": iterations,
+            "nlp_scaling_method": "none",  # rows and variables come with their scales
+            "obj_scaling_factor": self.slack_cost / slack_weight,
             "honor_original_bounds": "yes",
         }
         if math.isfinite(seconds):

@@ -1,0 +1,104 @@
+"""What depends on the inertias alone: the mass matrix by CRBA, the centroidal momentum matrix and the CoM's Jacobian.
+
+Source: R. Featherstone, "Rigid Body Dynamics Algorithms", Springer, 2008, chapter 6; the centroidal momentum matrix:
+D. E. Orin, A. Goswami, S.-H. Lee, "Centroidal dynamics of a humanoid robot", Autonomous Robots, 2013.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as cs
+
+from multimodal_to.adam.centroidal import composite_inertias
+from multimodal_to.adam.kinematics import Pose, body_poses
+from multimodal_to.adam.spatial import SX, Inertia, symmetric
+from multimodal_to.adam.tree import BASE, Tree
+
+
+@dataclass(frozen=True)
+class UnitMomenta:
+    """What a unit of each velocity sets moving, seen from the base's origin in the axes of the base's pose."""
+
+    columns: SX  # (6, 6 + n): momentum (l, k) for a unit of each of (ṗ, ω, ṡ)
+    poses: list[Pose]  # of the bodies, from the base's origin
+    com: SX  # [m], (3, 1)
+    composites: list[Inertia]  # of each body with all that hangs on it, in its own frame
+
+
+def unit_momenta(tree: Tree, base: Pose, s: SX) -> UnitMomenta:
+    """Return the momenta of unit velocities.
+
+    A unit velocity of joint i moves all that hangs on it, with the composite inertia (m, h, I) of body i:
+    l = z × h, k = I z + p_i × l, or l = m z, k = h × z + p_i × l when prismatic.
+    """
+    composites = composite_inertias(tree, s)
+    poses = body_poses(tree, Pose(base.rotation, cs.SX.zeros(3)), s)
+    whole = composites[BASE].rotated(base.rotation)
+    columns = cs.SX(6, 6 + len(tree.joints))
+    columns[:3, :3] = tree.total_mass * cs.SX.eye(3)
+    columns[3:, :3] = cs.skew(whole.first_moment)
+    columns[:3, 3:6] = -cs.skew(whole.first_moment)
+    columns[3:, 3:6] = whole.about_origin
+    for body, composite, pose in zip(tree.bodies[1:], composites[1:], poses[1:], strict=True):
+        x, y, _ = cs.vertsplit(composite.first_moment)
+        if body.prismatic:
+            linear, angular = cs.vertcat(0, 0, composite.mass), cs.vertcat(y, -x, 0)
+        else:
+            linear, angular = cs.vertcat(-y, x, 0), composite.about_origin[:, 2]
+        columns[:, 6 + body.column] = to_base(pose, linear, angular)
+    return UnitMomenta(columns, poses, whole.first_moment / tree.total_mass, composites)
+
+
+def to_base(pose: Pose, linear: SX, angular: SX) -> SX:
+    """Return a momentum or wrench at a body's origin, in body axes, at the base's origin: (R l, R k + p × R l)."""
+    turned = pose.rotation @ linear
+    return cs.vertcat(turned, pose.rotation @ angular + cs.cross(pose.translation, turned))
+
+
+def joint_motions(tree: Tree, poses: list[Pose]) -> SX:
+    """Return what a unit of each joint's velocity does at the base's origin, (6, n): (p × a, a), or (a, 0)."""
+    motions = cs.SX(6, len(tree.joints))
+    for body, pose in zip(tree.bodies[1:], poses[1:], strict=True):
+        axis = pose.rotation[:, 2]
+        if body.prismatic:
+            motions[:3, body.column] = axis
+        else:
+            motions[:3, body.column] = cs.cross(pose.translation, axis)
+            motions[3:, body.column] = axis
+    return motions
+
+
+def mass_matrix(tree: Tree, base: Pose, s: SX) -> SX:
+    """Return M(q), (6 + n, 6 + n), for ν = (ṗ_base, ω_base, ṡ): the composite rigid body algorithm (CRBA).
+
+    M_ij of joint i and a joint j above it is the momentum that joint i gives, along the motion of joint j; joints on
+    different branches do not meet.
+    """
+    units = unit_momenta(tree, base, s)
+    motions = joint_motions(tree, units.poses)
+    matrix = cs.SX(6 + len(tree.joints), 6 + len(tree.joints))
+    matrix[:6, :] = units.columns
+    for index, body in enumerate(tree.bodies):
+        for above in tree.path(index):
+            i, j = body.column, tree.bodies[above].column
+            low, high = sorted((6 + i, 6 + j))
+            motion, momentum = motions[:, j], units.columns[:, 6 + i]
+            matrix[low, high] = cs.dot(motion[3:], momentum[3:]) + cs.dot(motion[:3], momentum[:3])
+    return cs.sparsify(symmetric(matrix))
+
+
+def centroidal_momentum_matrix(tree: Tree, base: Pose, s: SX) -> SX:
+    """Return J_CMM(q), (6, 6 + n), with h = J_CMM ν about the CoM: the unit momenta of CRBA, moved there."""
+    units = unit_momenta(tree, base, s)
+    matrix = cs.SX(units.columns)
+    matrix[3:, :3] = 0
+    for column in range(3, 6 + len(tree.joints)):
+        matrix[3:, column] = units.columns[3:, column] - cs.cross(units.com, units.columns[:3, column])
+    matrix[3:, 3:6] = symmetric(matrix[3:, 3:6])
+    return cs.sparsify(matrix)
+
+
+def com_jacobian(tree: Tree, base: Pose, s: SX) -> SX:
+    """Return J_CoM(q), (3, 6 + n), with ẋ = J_CoM ν: the linear unit momenta over the mass."""
+    return cs.sparsify(unit_momenta(tree, base, s).columns[:3, :] / tree.total_mass)

@@ -1,0 +1,186 @@
+"""What a URDF holds, for a person: the tree with its masses, what was merged or locked, and what looks wrong."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from multimodal_to.adam.lean_tree import build_tree
+from multimodal_to.adam.tree import Joint, Link, Tree
+from multimodal_to.adam.urdf import read_urdf
+
+EFFORT_PLACEHOLDER = 1e4
+"""No joint of a robot that walks gives this much [N m or N]."""
+VELOCITY_PLACEHOLDER = 1e3
+"""No joint of a robot that walks turns this fast [rad/s or m/s]."""
+FAR = 2.0
+"""A CoM farther than this from its link's origin [m] is most likely in the wrong unit."""
+RADIUS = 5.0
+"""A radius of gyration above this [m] is most likely in the wrong unit."""
+_ROUNDING = 1e-3
+"""Principal inertias that miss the triangle inequality by less than this part were rounded."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """Something that looks wrong: of which link or joint, and what, as the end of a sentence about it."""
+
+    subject: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.subject} {self.text}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Branch:
+    """A link in the tree, and the joint that it hangs on (None for the base)."""
+
+    depth: int
+    link: Link
+    joint: Joint | None
+    state: str  # "base", "moves", "fixed", or "locked at ..."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Description:
+    """What a URDF holds."""
+
+    tree: Tree
+    branches: tuple[Branch, ...]  # depth first
+    findings: tuple[Finding, ...]
+
+    def __str__(self) -> str:
+        tree, moving = self.tree, len(self.tree.joints)
+        lines = [
+            f"{len(self.branches)} links, {moving} moving joints ({6 + moving} degrees of freedom with the base "
+            f"'{tree.base}'), {tree.total_mass:.3f} kg",
+            "",
+            *(_line(branch) for branch in self.branches),
+            "",
+            f"frames: {len(tree.frames)}, one for each link; merged into the body they move with: {len(tree.merged)}",
+            *(f"  {link} → {body}" for link, body in tree.merged.items()),
+            f"locked joints: {len(tree.locked)}",
+            *(f"  {joint} at {value:g}" for joint, value in tree.locked.items()),
+            f"looks wrong: {len(self.findings)}",
+            *(f"  {finding}" for finding in self.findings),
+        ]
+        return "\n".join(lines)
+
+
+def describe(
+    urdf: str | os.PathLike[str],
+    joint_names: Sequence[str] | None = None,
+    locked: Mapping[str, float] | None = None,
+) -> Description:
+    """Return what a URDF holds; by default all joints move that can, and those that mimic another are locked.
+
+    Raises:
+        ModelError: the file is missing or no URDF, or it describes something that no robot can have.
+    """
+    links, joints = read_urdf(urdf)
+    locked = dict(locked or {})
+    if joint_names is None:
+        for joint in joints:
+            if joint.mimic is not None and joint.kind != "fixed":
+                locked.setdefault(joint.name, 0.0)
+        joint_names = [joint.name for joint in joints if joint.kind != "fixed" and joint.name not in locked]
+    tree = build_tree(links, joints, joint_names, locked)
+    return Description(tree=tree, branches=_branches(tree, links, joints), findings=findings(tree, links, joints))
+
+
+def findings(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tuple[Finding, ...]:
+    """Return what looks wrong about the links and joints, link by link and joint by joint."""
+    found = [Finding(subject=f"link '{link.name}'", text=text) for link in links for text in _link_findings(link)]
+    moving, carried = set(tree.joint_names), _carried_masses(links, joints)
+    for joint in joints:
+        texts = list(joint.remarks)
+        if joint.kind != "fixed":
+            texts += _joint_findings(joint, carried[joint.child] if joint.name in moving else None)
+        found += [Finding(subject=f"joint '{joint.name}'", text=text) for text in texts]
+    return tuple(found)
+
+
+def _link_findings(link: Link) -> Iterator[str]:
+    """Yield what looks wrong about one link; a link without any inertial is a frame and no fault."""
+    if link.mass == 0 and not link.inertia.any():
+        return
+    yield from link.remarks
+    if link.mass == 0:
+        yield "has an inertia but no mass"
+    if np.linalg.norm(link.com) > FAR:
+        yield f"has its CoM {np.linalg.norm(link.com):.3g} m from its origin"
+    smallest, middle, largest = np.linalg.eigvalsh(link.inertia)
+    if smallest < 0:
+        yield f"has the negative principal inertia {smallest:.3g} kg m²"
+    elif largest == 0:
+        yield f"has a mass of {link.mass:g} kg but no inertia"
+    elif largest - smallest - middle > _ROUNDING * largest:
+        yield (
+            "has an inertia that no body can have: of its principal values "
+            f"{smallest:.3g}, {middle:.3g} and {largest:.3g} kg m², the last is more than the others together"
+        )
+    if link.mass > 0 and largest > link.mass * RADIUS**2:
+        yield f"has an inertia of {largest:.3g} kg m², far too much for {link.mass:g} kg"
+
+
+def _joint_findings(joint: Joint, carried_mass: float | None) -> Iterator[str]:
+    """Yield what looks wrong about one joint that can move; `carried_mass` [kg] is None if it is locked."""
+    if np.isfinite(joint.effort) and (joint.effort >= EFFORT_PLACEHOLDER or joint.effort <= 0):
+        yield f"has the effort limit {joint.effort:g}, which looks like a placeholder"
+    if np.isfinite(joint.velocity) and (joint.velocity >= VELOCITY_PLACEHOLDER or joint.velocity <= 0):
+        yield f"has the velocity limit {joint.velocity:g}, which looks like a placeholder"
+    if joint.lower == joint.upper:
+        yield f"has the range {joint.lower:g} to {joint.upper:g}, so it cannot move"
+    if joint.kind == "revolute" and joint.upper - joint.lower > 4 * np.pi and np.isfinite(joint.upper - joint.lower):
+        yield f"has the range {joint.lower:g} to {joint.upper:g} rad, which looks like a placeholder or degrees"
+    if joint.mimic is not None:
+        yield f"mimics '{joint.mimic.joint}', which is not supported"
+    if carried_mass == 0:
+        yield "moves nothing that has mass, so its acceleration is undefined"
+
+
+def _carried_masses(links: Sequence[Link], joints: Sequence[Joint]) -> dict[str, float]:
+    """Return for each link the mass [kg] of all that hangs on it, itself included."""
+    above = {joint.child: joint.parent for joint in joints}
+    carried = dict.fromkeys((link.name for link in links), 0.0)
+    for link in links:
+        name: str | None = link.name
+        while name is not None:
+            carried[name] += link.mass
+            name = above.get(name)
+    return carried
+
+
+def _branches(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tuple[Branch, ...]:
+    link_of = {link.name: link for link in links}
+    below: dict[str, list[Joint]] = {}
+    for joint in joints:
+        below.setdefault(joint.parent, []).append(joint)
+    branches: list[Branch] = []
+    pending: list[tuple[int, str, str, Joint | None]] = [(0, tree.base, "base", None)]
+    while pending:
+        depth, name, state, above = pending.pop()
+        branches.append(Branch(depth=depth, link=link_of[name], joint=above, state=state))
+        for joint in reversed(below.get(name, [])):
+            if joint.name in tree.locked:
+                state = f"locked at {tree.locked[joint.name]:g}"
+            else:
+                state = "fixed" if joint.kind == "fixed" else "moves"
+            pending.append((depth + 1, joint.child, state, joint))
+    return tuple(branches)
+
+
+def _line(branch: Branch) -> str:
+    mass = f"{branch.link.mass:.3f} kg" if branch.link.mass else "no mass"
+    start = f"{'  ' * branch.depth}{branch.link.name}  {mass}"
+    if branch.joint is None:
+        return start
+    joint = branch.joint
+    state = joint.kind if branch.state == "moves" else branch.state
+    if branch.state == "moves" and np.isfinite(joint.upper - joint.lower):
+        state += f" {joint.lower:g} to {joint.upper:g} {'m' if joint.kind == 'prismatic' else 'rad'}"
+    return f"{start}  ← {joint.name} ({state})"

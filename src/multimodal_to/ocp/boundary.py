@@ -1,0 +1,92 @@
+"""How a motion starts and ends: bounds at the first and last knots, and the rows that only they have."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multimodal_to.models.robot import Posture, Robot
+from multimodal_to.ocp import constraints
+from multimodal_to.ocp.constraints import KnotRows
+from multimodal_to.ocp.guess import contact_positions
+from multimodal_to.ocp.scenario import Scenario, Start, Terminal
+from multimodal_to.ocp.variables import Bounds
+
+START_ROWS: dict[Start, tuple[KnotRows, ...]] = {
+    Start.STANDING: (constraints.friction_pyramid, constraints.static_equilibrium),
+    Start.HOVER: (
+        constraints.unit_quaternion,
+        constraints.com_kinematics,
+        constraints.contact_kinematics,
+        constraints.non_penetration,
+        constraints.friction_pyramid,
+        constraints.static_equilibrium,
+        constraints.steady_thrust,
+    ),
+}
+"""Rows of the first knot: a standing posture is given, and only its forces are found; a hovering one is found too."""
+
+END_ROWS: dict[Terminal, tuple[KnotRows, ...]] = {
+    Terminal.HOVER: (),
+    Terminal.STANDING: (constraints.standing_height,),
+    Terminal.FREE: (),
+}
+"""Rows of the last knot beside those of every knot."""
+
+_AT_REST = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
+_NO_FORCE = 0.01
+"""Largest contact force component left at a knot that has to be free of contact [N]."""
+_UPRIGHT = 1e-3
+"""How far the base's quaternion may be from upright at an end in the air [1]."""
+_ORIENTATION = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def set_boundary(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture) -> None:
+    """Hold the first and last knots as the scenario says."""
+    _set_start(bounds, robot, scenario, standing)
+    _set_end(bounds, scenario)
+    if scenario.mid_height_min is not None:
+        low = bounds.lower["com_position"]
+        low[2, scenario.knots // 2] = max(low[2, scenario.knots // 2], scenario.mid_height_min)
+
+
+def _set_start(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture) -> None:
+    fix = bounds.fix
+    fix("com_position", 0, np.array(scenario.initial_com))
+    for name in (
+        *_AT_REST,
+        "com_velocity",
+        "angular_momentum",
+        "complementarity_slack",
+        "sliding_slack",
+        "thrust_rate",
+    ):
+        fix(name, 0, 0.0)
+    if scenario.start is Start.HOVER:
+        fix("base_quaternion_xyzw", 0, _ORIENTATION, within=_UPRIGHT)
+        fix("contact_forces", 0, 0.0, within=_NO_FORCE)
+        return
+    fix("base_position", 0, standing.base_position)
+    fix("base_quaternion_xyzw", 0, standing.base_quaternion_xyzw)
+    fix("joint_positions", 0, standing.joint_positions)
+    fix("contact_positions", 0, contact_positions(robot, standing))
+    fix("thrust", 0, 0.0)
+    idle = [np.clip(jet.model.steady_throttle(0.0), jet.throttle_min, jet.throttle_max) for jet in robot.jets]
+    fix("throttle", 0, np.array(idle))
+
+
+def _set_end(bounds: Bounds, scenario: Scenario) -> None:
+    fix, last = bounds.fix, scenario.knots
+    fix("com_position", last, np.array(scenario.final_com))
+    if scenario.terminal is Terminal.FREE:
+        return
+    # Velocities at the last knot hold its CoM velocity and angular momentum as well; these at the knot before make the
+    # accelerations over the last interval zero.
+    for name in _AT_REST:
+        fix(name, last, 0.0)
+    for name in ("com_velocity", "angular_momentum"):
+        fix(name, last - 1, 0.0)
+    if scenario.terminal is Terminal.HOVER:
+        for knot in (last - 1, last):
+            fix("thrust_rate", knot, 0.0)
+        fix("contact_forces", last, 0.0, within=_NO_FORCE)
+        fix("base_quaternion_xyzw", last, _ORIENTATION, within=_UPRIGHT)

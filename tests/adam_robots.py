@@ -1,0 +1,139 @@
+"""The robots that the tests of `adam/` use, their random states, and Pinocchio's model of them in our coordinates."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+import casadi as cs
+import numpy as np
+import pinocchio as pin
+
+from multimodal_to.adam import GRAVITY, KinDynComputations, Representations, quaternion
+
+IRONCUB = Path(__file__).parents[1] / "robots" / "ironcub"
+BODY = Representations.BODY_FIXED_REPRESENTATION
+MIXED = Representations.MIXED_REPRESENTATION
+INERTIAL = Representations.INERTIAL_FIXED_REPRESENTATION
+
+
+def ironcub_joints() -> list[str]:
+    return list(tomllib.loads((IRONCUB / "robot.toml").read_text(encoding="utf-8"))["joints"])
+
+
+@cache
+def example_robots() -> Path:
+    """Return the folder of `example-robot-data`, from the list of files of its package."""
+    for file in metadata.files("example-robot-data") or []:
+        parts = file.parts
+        if "robots" in parts and parts[parts.index("robots") - 1] == "example-robot-data":
+            path = Path(str(metadata.distribution("example-robot-data").locate_file(file))).resolve()
+            return Path(*path.parts[: path.parts.index("robots", path.parts.index("example-robot-data")) + 1])
+    raise FileNotFoundError("example-robot-data holds no robots")
+
+
+def random_rotation(rng: np.random.Generator) -> np.ndarray:
+    values = rng.normal(size=4)
+    return np.array(quaternion.rotation_matrix(cs.DM(values / np.linalg.norm(values))))
+
+
+@dataclass(frozen=True, kw_only=True)
+class State:
+    H: np.ndarray  # (4, 4)
+    s: np.ndarray
+    v: np.ndarray  # (6,), in whatever representation the test says
+    s_dot: np.ndarray
+    v_dot: np.ndarray
+    s_ddot: np.ndarray
+
+    @property
+    def pose(self) -> tuple[np.ndarray, ...]:
+        return self.H, self.s
+
+    @property
+    def motion(self) -> tuple[np.ndarray, ...]:
+        return self.H, self.s, self.v, self.s_dot
+
+    @property
+    def nu(self) -> np.ndarray:
+        return np.concatenate([self.v, self.s_dot])
+
+    @property
+    def nu_dot(self) -> np.ndarray:
+        return np.concatenate([self.v_dot, self.s_ddot])
+
+
+def random_states(n: int, count: int, seed: int) -> list[State]:
+    rng = np.random.default_rng(seed)
+    states = []
+    for _ in range(count):
+        H = np.eye(4)
+        H[:3, :3], H[:3, 3] = random_rotation(rng), rng.normal(size=3)
+        s, s_dot, s_ddot = rng.uniform(-3, 3, n), 2 * rng.normal(size=n), 5 * rng.normal(size=n)
+        states.append(State(H=H, s=s, v=rng.normal(size=6), s_dot=s_dot, v_dot=rng.normal(size=6), s_ddot=s_ddot))
+    return states
+
+
+def skew(a: np.ndarray) -> np.ndarray:
+    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+
+
+def adjoint(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Return X with (v of the world's origin, ω in world axes) = X (v, ω in the frame's own)."""
+    return np.block([[R, skew(p) @ R], [np.zeros((3, 3)), R]])
+
+
+def local_from(representation: Representations, H: np.ndarray) -> np.ndarray:
+    """Return what maps a velocity in `representation` to (v, ω) in the frame's own axes, written anew."""
+    R, p = H[:3, :3], H[:3, 3]
+    if representation is BODY:
+        return np.eye(6)
+    if representation is MIXED:
+        return np.kron(np.eye(2), R.T)
+    return np.linalg.inv(adjoint(R, p))
+
+
+class Peer:
+    """Pinocchio's model of a URDF, with joints in our order; joints that we do not move are locked at zero."""
+
+    def __init__(self, urdf: Path, joint_names: tuple[str, ...]) -> None:
+        model = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
+        locked = [index for index, name in enumerate(model.names) if index > 1 and name not in joint_names]
+        self.model = pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
+        self.model.gravity.linear = np.array(GRAVITY)
+        self.data = self.model.createData()
+        self.joints = [self.model.joints[self.model.getJointId(name)] for name in joint_names]
+        self.columns = np.array([*range(6), *(joint.idx_v for joint in self.joints)])
+
+    def q(self, state: State) -> np.ndarray:
+        q = pin.neutral(self.model)
+        q[:3], q[3:7] = state.H[:3, 3], pin.Quaternion(state.H[:3, :3]).coeffs()
+        for joint, value in zip(self.joints, state.s, strict=True):
+            q[joint.idx_q : joint.idx_q + joint.nq] = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+        return q
+
+    def into(self, state: State, representation: Representations) -> np.ndarray:
+        """Return the matrix that maps ν in our order and `representation` to Pinocchio's v."""
+        matrix = np.zeros((self.model.nv, 6 + len(self.joints)))
+        matrix[:6, :6] = local_from(representation, state.H)
+        matrix[self.columns[6:], np.arange(6, 6 + len(self.joints))] = 1
+        return matrix
+
+
+@dataclass(frozen=True)
+class Example:
+    """A robot of `example-robot-data`: its file, and the joints to lock at zero."""
+
+    path: str
+    locked: tuple[str, ...] = ()
+
+    @property
+    def urdf(self) -> Path:
+        return example_robots() / self.path
+
+    def kindyn(self, representation: Representations = MIXED) -> KinDynComputations:
+        locked = dict.fromkeys(self.locked, 0.0)
+        return KinDynComputations(self.urdf, representation=representation, locked_joints=locked)
