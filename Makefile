@@ -7,7 +7,7 @@ RESULTS := results/take-off
 
 help:
 	@echo "make take-off   set up, solve the take-off, write $(RESULTS)/{trajectory.npz,forces.png,replay.html}"
-	@echo "make test       set up, check the style and run the tests (about ten minutes)"
+	@echo "make test       set up, check the style and run the tests"
 	@echo "make lint       ruff and mypy --strict"
 	@echo "make clean      remove the environment and the results"
 

@@ -50,7 +50,7 @@ def main() -> None:
         axes.imshow(snapshot(RESULTS / "replay.html", time))
         axes.set_title(f"{time:.1f} s", fontsize="medium")
         axes.axis("off")
-    figure.savefig(ROOT / "docs" / "take-off.png")
+    figure.savefig(ROOT / "docs" / "take-off.png", bbox_inches="tight")
     plot_forces(mt.load_robot(trajectory.robot), trajectory).savefig(ROOT / "docs" / "take-off-forces.png", dpi=100)
 
 

@@ -22,9 +22,9 @@ def spoil(trajectory, name, row, amount, knot=KNOT):
 @pytest.mark.parametrize(
     ("property_name", "quantity", "row", "amount"),
     [
-        ("CoM against forward kinematics", "com_position", 1, 1e-4),
-        ("angular momentum against J_CMM ν", "angular_momentum", 2, 1e-2),
-        ("contact points against forward kinematics", "contact_positions", 4, 1e-4),
+        ("CoM consistency", "com_position", 1, 1e-4),
+        ("angular momentum consistency", "angular_momentum", 2, 1e-2),
+        ("contact point consistency", "contact_positions", 4, 1e-4),
         ("quaternion norm", "base_quaternion_xyzw", 3, 1e-4),
         ("force balance", "contact_forces", 5, 1.0),
         ("moment balance", "contact_forces", 5, 5.0),
@@ -34,7 +34,7 @@ def spoil(trajectory, name, row, amount, knot=KNOT):
         ("integration of thrust", "thrust_rate", 1, 1.0),
         ("thrust dynamics", "throttle", 1, -1.0),
         ("pulling normal force", "contact_forces", 2, -500.0),
-        ("friction beyond the pyramid", "contact_forces", 0, 100.0),
+        ("beyond the friction pyramid", "contact_forces", 0, 100.0),
         ("joint range", "joint_positions", 14, 3.0),
         ("joint speed", "joint_velocities", 3, 10.0),
         ("thrust range", "thrust", 2, 300.0),

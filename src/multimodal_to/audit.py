@@ -126,10 +126,10 @@ def _kinematics(robot: Robot, trajectory: Trajectory) -> list[Finding]:
     norms = np.linalg.norm(trajectory.base_quaternion_xyzw, axis=0)
     by_contact = np.abs(points - trajectory.contact_positions).reshape(len(robot.contacts), 3, count).max(axis=1)
     return [
-        _finding("CoM against forward kinematics", "m", 1e-5, _largest(com - trajectory.com_position)),
-        _finding("angular momentum against J_CMM ν", "kg m²/s", 1e-4,
+        _finding("CoM consistency", "m", 1e-5, _largest(com - trajectory.com_position)),
+        _finding("angular momentum consistency", "kg m²/s", 1e-4,
                  _largest(momentum[3:] - trajectory.angular_momentum)),
-        _finding("contact points against forward kinematics", "m", 1e-5, by_contact, robot.contact_names),
+        _finding("contact point consistency", "m", 1e-5, by_contact, robot.contact_names),
         _finding("quaternion norm", "1", 1e-6, np.abs(norms - 1)),
     ]  # fmt: skip
 
@@ -208,7 +208,7 @@ def _contacts(robot: Robot, trajectory: Trajectory, surface: Surface, friction: 
     return [
         _finding("penetration", "m", 1e-5, -heights, names),
         _finding("pulling normal force", "N", 1e-3, -normal, names),
-        _finding("friction beyond the pyramid", "N", 1e-3, along - friction * normal, names),
+        _finding("beyond the friction pyramid", "N", 1e-3, along - friction * normal, names),
         _finding("normal force × height", "N m", 0.01, normal * heights, names),
         _finding("slip under load", "m", 1e-3, np.where(normal > LOADED, slips, 0.0), names),
     ]

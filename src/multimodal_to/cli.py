@@ -17,7 +17,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.live import Live
-from rich.table import Table
+from rich.table import Column, Table
+from rich.text import Text
 
 from multimodal_to.adam.inspection import describe
 from multimodal_to.audit import Audit, audit
@@ -200,7 +201,7 @@ def audit_file(file: File, robot: RobotOption = "") -> None:
     """
     trajectory = Trajectory.load(file)
     report = audit(load_robot(robot or trajectory.robot), trajectory)
-    table = Table("property", "worst", "limit", "unit", "knot", "where", "", box=None)
+    table = Table(Column("property", no_wrap=True), "worst", "limit", "unit", "knot", "where", "", box=None)
     for finding in report.findings:
         verdict = "ok" if finding.holds else "FAILS"
         table.add_row(finding.name, f"{finding.worst:.2e}", f"{finding.limit:g}", finding.unit, str(finding.knot),
@@ -258,11 +259,11 @@ class _Progress:
 
     def __call__(self, iterate: Iterate) -> bool:
         line = (
-            f"iteration {iterate.iteration:4d}   objective {iterate.objective:12.6g}   largest violation "
-            f"{iterate.violation:8.1e} {iterate.unit} ({iterate.worst})   {iterate.elapsed:5.1f} s"
+            f"{iterate.elapsed:5.1f} s   iteration {iterate.iteration:4d}   objective {iterate.objective:11.5g}   "
+            f"largest violation {iterate.violation:.1e} {iterate.unit} ({iterate.worst})"
         )
         if self._console.is_terminal:
-            self._live.update(line)
+            self._live.update(Text(line, no_wrap=True, overflow="ellipsis"))
         elif iterate.elapsed - self._printed >= _LINE_EVERY:
             self._printed = iterate.elapsed
             self._console.print(line, soft_wrap=True)

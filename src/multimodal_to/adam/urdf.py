@@ -1,4 +1,4 @@
-"""The URDF reader: `yourdfpy` parses, this file checks and hands over links and joints. The only file that knows it."""
+"""The URDF reader: `yourdfpy` parses, this file checks and hands over links and joints."""
 
 from __future__ import annotations
 
