@@ -28,6 +28,7 @@ OCP_FLOORS = [
     {"constraints", "guess"},
     {"costs", "boundary"},
     {"transcription", "solvers"},
+    {"stages"},
     {"problem"},
     {"solution"},
     {"__init__"},
