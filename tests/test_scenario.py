@@ -86,7 +86,7 @@ def test_an_end_that_contradicts_the_bounds_is_refused(ironcub, scenario):
 
 def test_an_unknown_scenario_is_named_with_those_that_exist():
     with pytest.raises(
-        ScenarioError, match=r"unknown scenario 'takeof'; did you mean 'take-off'\? Available: take-off"
+        ScenarioError, match=r"unknown scenario 'takeof'; did you mean 'take-off'\? Available: take-off, landing"
     ):
         scenarios.find("takeof")
 

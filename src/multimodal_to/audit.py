@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
 from multimodal_to.derived import base_poses, contact_points, flight_phases, thrust_forces
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
@@ -82,6 +83,7 @@ def audit(robot: Robot, trajectory: Trajectory, surface: Surface | None = None, 
         findings=(
             *_kinematics(robot, trajectory),
             *_dynamics(robot, trajectory),
+            *_torques(robot, trajectory),
             *_integration(trajectory),
             *_jets(robot, trajectory),
             *_contacts(robot, trajectory, surface or FlatGround(), coefficient),
@@ -127,7 +129,7 @@ def _kinematics(robot: Robot, trajectory: Trajectory) -> list[Finding]:
     by_contact = np.abs(points - trajectory.contact_positions).reshape(len(robot.contacts), 3, count).max(axis=1)
     return [
         _finding("CoM consistency", "m", 1e-5, _largest(com - trajectory.com_position)),
-        _finding("angular momentum consistency", "kg m²/s", 1e-4,
+        _finding("momentum consistency", "kg m²/s", 1e-4,
                  _largest(momentum[3:] - trajectory.angular_momentum)),
         _finding("contact point consistency", "m", 1e-5, by_contact, robot.contact_names),
         _finding("quaternion norm", "1", 1e-6, np.abs(norms - 1)),
@@ -148,6 +150,36 @@ def _dynamics(robot: Robot, trajectory: Trajectory) -> list[Finding]:
     ]
 
 
+def _torques(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+    """RNEA along the motion under all contact forces and thrusts: joint torques, and what is left for the base.
+
+    Accelerations are backward differences of the velocities, as the optimiser's backward Euler has them; placeholders
+    of effort limits limit nothing.
+    """
+    count = trajectory.time.size
+    velocities = np.vstack([
+        trajectory.base_linear_velocity, trajectory.base_angular_velocity, trajectory.joint_velocities
+    ])  # fmt: skip
+    steps = np.diff(trajectory.time, prepend=trajectory.time[0] - 1.0)
+    accelerations = np.diff(velocities, axis=1, prepend=velocities[:, :1]) / steps
+    frames = (*robot.contact_names, *(jet.frame for jet in robot.jets))
+    forces = [*trajectory.per_contact("contact_forces"), *(force.T for force in thrust_forces(robot, trajectory)[1])]
+    generalised = np.array(
+        robot.kindyn.rnea_fun(frames).map(count)(
+            np.hstack(list(base_poses(trajectory))), trajectory.joint_positions, velocities[:6],
+            trajectory.joint_velocities, accelerations[:6], accelerations[6:],
+            *(np.vstack([force, np.zeros((3, count))]) for force in forces),
+        )
+    )  # fmt: skip
+    effort = np.where(robot.joint_limits.effort < EFFORT_PLACEHOLDER, robot.joint_limits.effort, np.inf)
+    beyond = np.abs(generalised[6:]) - effort[:, None]
+    return [
+        _finding("torque beyond effort", "N m", 1e-3, beyond, robot.joint_names),
+        _finding("unexplained base force", "N", 0.01 * robot.weight, _largest(generalised[:3])),
+        _finding("unexplained base moment", "N m", 1.0, _largest(generalised[3:6])),
+    ]
+
+
 def _integration(trajectory: Trajectory) -> list[Finding]:
     """Backward Euler: what a quantity gains over an interval is its rate at the end times Δt."""
     steps = np.diff(trajectory.time)
@@ -163,11 +195,11 @@ def _integration(trajectory: Trajectory) -> list[Finding]:
         ("thrust_rate", "thrust_acceleration", "N/s", 1e-3),
     ):
         gaps = np.diff(getattr(trajectory, name), axis=1) - getattr(trajectory, rate)[:, 1:] * steps
-        findings.append(_finding(f"integration of {name}", unit, limit, _largest(gaps), first=1))
+        findings.append(_finding(f"gap of {name}", unit, limit, _largest(gaps), first=1))
     rotations = base_poses(trajectory)[:, :3, :3]
     turned = rotations[1:] @ rotations[:-1].transpose(0, 2, 1)
     gaps = turned - _rodrigues(trajectory.base_angular_velocity[:, 1:].T * steps[:, None])
-    findings.append(_finding("integration of base orientation", "rad", 1e-5, np.abs(gaps).max(axis=(1, 2)), first=1))
+    findings.append(_finding("gap of base orientation", "rad", 1e-5, np.abs(gaps).max(axis=(1, 2)), first=1))
     return findings
 
 
@@ -208,7 +240,7 @@ def _contacts(robot: Robot, trajectory: Trajectory, surface: Surface, friction: 
     return [
         _finding("penetration", "m", 1e-5, -heights, names),
         _finding("pulling normal force", "N", 1e-3, -normal, names),
-        _finding("beyond the friction pyramid", "N", 1e-3, along - friction * normal, names),
+        _finding("friction beyond pyramid", "N", 1e-3, along - friction * normal, names),
         _finding("normal force × height", "N m", 0.01, normal * heights, names),
         _finding("slip under load", "m", 1e-3, np.where(normal > LOADED, slips, 0.0), names),
     ]

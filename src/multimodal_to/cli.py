@@ -201,10 +201,11 @@ def audit_file(file: File, robot: RobotOption = "") -> None:
     """
     trajectory = Trajectory.load(file)
     report = audit(load_robot(robot or trajectory.robot), trajectory)
-    table = Table(Column("property", no_wrap=True), "worst", "limit", "unit", "knot", "where", "", box=None)
+    narrow = [Column(title, no_wrap=True) for title in ("property", "worst", "limit", "unit", "knot")]
+    table = Table(*narrow, "where", Column(no_wrap=True), box=None, pad_edge=False)
     for finding in report.findings:
         verdict = "ok" if finding.holds else "FAILS"
-        table.add_row(finding.name, f"{finding.worst:.2e}", f"{finding.limit:g}", finding.unit, str(finding.knot),
+        table.add_row(finding.name, f"{finding.worst:.1e}", f"{finding.limit:.2g}", finding.unit, str(finding.knot),
                       finding.body, verdict)  # fmt: skip
     _out.print(table)
     _out.print(_describe(report))

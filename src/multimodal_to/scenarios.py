@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 from multimodal_to.errors import ScenarioError, unknown
-from multimodal_to.ocp.scenario import Scenario, Terminal, Weights
+from multimodal_to.ocp.scenario import Scenario, Start, Terminal, Weights
 
 
 def take_off() -> Scenario:
@@ -37,7 +38,28 @@ def take_off() -> Scenario:
     )
 
 
-SCENARIOS: Mapping[str, Callable[[], Scenario]] = MappingProxyType({"take-off": take_off})
+def landing() -> Scenario:
+    """Return the landing: from a hover down to standing, with the jets spooling down.
+
+    Weights start from the take-off's. A contact force costs a fiftieth and a thrust a little, so that the ground takes
+    the weight over instead of the jets carrying it to the end; the speed's weight keeps the touch-down below 0.3 m/s.
+    """
+    return Scenario(
+        name="landing",
+        title="Landing from hover to standing",
+        knots=70,
+        initial_com=(0.0, 0.0, 0.70),
+        final_com=(0.0, 0.0, 0.57),
+        start=Start.HOVER,
+        terminal=Terminal.STANDING,
+        interval_min=0.10,
+        interval_max=0.10,
+        slack_schedule=(0.02, 0.2, 1.0),
+        weights=replace(take_off().weights, contact_forces=1.0, thrust=5.0, initial_posture=1e6, final_posture=1e6),
+    )
+
+
+SCENARIOS: Mapping[str, Callable[[], Scenario]] = MappingProxyType({"take-off": take_off, "landing": landing})
 """The bundled scenarios by name."""
 
 
