@@ -172,7 +172,8 @@ def replay(
     _out.print(f"replaying at {visualizer.url()}; Ctrl-C ends", soft_wrap=True)
     visualizer.open()
     try:
-        signal.pause()
+        while True:
+            time.sleep(1.0)
     except KeyboardInterrupt:
         _out.print()
 
