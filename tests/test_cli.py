@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from multimodal_to.trajectory import Trajectory
@@ -89,6 +90,16 @@ def test_audit_says_what_fails_and_leaves_with_one(file):
     result = run("audit", file)  # a drawn motion, not a true one
     assert result.returncode == 1
     assert "FAILS" in result.stdout
+
+
+def test_bare_arrays_are_audited_once_their_robot_is_named(file, tmp_path):
+    with np.load(file) as archive:
+        arrays = {name: archive[name] for name in archive.files if name not in ("format_version", "contact_positions")}
+    np.savez(tmp_path / "bare.npz", **arrays)
+    assert "has no format_version" in run("audit", tmp_path / "bare.npz").stderr
+    result = run("audit", tmp_path / "bare.npz", "--robot", "ironcub")
+    assert result.returncode == 1
+    assert "contact point consistency  0.0e+00" in result.stdout
 
 
 @pytest.mark.parametrize(

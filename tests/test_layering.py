@@ -18,7 +18,7 @@ FLOORS = [
     {"ocp"},
     {"scenarios"},
     {"derived"},
-    {"audit", "replay", "plotting"},
+    {"audit", "replay", "plotting", "importing"},
     {"cli", "__init__"},
     {"__main__"},
 ]

@@ -23,11 +23,12 @@ from rich.text import Text
 from multimodal_to.adam.inspection import describe
 from multimodal_to.audit import Audit, audit
 from multimodal_to.errors import MultimodalError, OutputError
-from multimodal_to.models.robot import load_robot
+from multimodal_to.importing import import_arrays
+from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.ocp import Ipopt, Iterate, Solution, build
 from multimodal_to.ocp import solve as run_solver
 from multimodal_to.scenarios import SCENARIOS, find
-from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory import Trajectory, read_archive
 
 app = typer.Typer(
     name="multimodal-to",
@@ -126,6 +127,15 @@ def solve(
         raise typer.Exit(1)
 
 
+def _load(file: Path, robot: str) -> tuple[Robot, Trajectory]:
+    """Return a trajectory with its robot; a file of bare arrays needs the robot named."""
+    if robot and "format_version" not in read_archive(file):
+        the_robot = load_robot(robot)
+        return the_robot, import_arrays(the_robot, file)
+    trajectory = Trajectory.load(file)
+    return load_robot(robot or trajectory.robot).with_jets(trajectory.jet_names), trajectory
+
+
 @app.command()
 def plot(
     file: File,
@@ -138,14 +148,14 @@ def plot(
 
     Example: multimodal-to plot results/take-off/trajectory.npz --output forces.svg
     """
-    trajectory = Trajectory.load(file)
+    the_robot, trajectory = _load(file, robot)
     target = output or file.with_suffix(".png")
     if target.suffix not in (".png", ".svg", ".pdf"):
         raise OutputError(f"'{target}' is no .png, .svg or .pdf")
     _writable(target.parent)
     from multimodal_to.plotting import plot_forces
 
-    plot_forces(load_robot(robot or trajectory.robot), trajectory).savefig(target, dpi=150)
+    plot_forces(the_robot, trajectory).savefig(target, dpi=150)
     _out.print(f"wrote {target}", soft_wrap=True)
 
 
@@ -159,8 +169,7 @@ def replay(
 
     Example: multimodal-to replay results/take-off/trajectory.npz --html take-off.html
     """
-    trajectory = Trajectory.load(file)
-    the_robot = load_robot(robot or trajectory.robot)
+    the_robot, trajectory = _load(file, robot)
     if html is not None:
         _writable(html.parent)
     from multimodal_to.replay import show, write_html
@@ -198,10 +207,11 @@ def robot_info(
 def audit_file(file: File, robot: RobotOption = "") -> None:
     """Check from the file alone whether a trajectory is physically true; exit status 1 when it is not.
 
+    With --robot it also takes bare arrays under the names of a trajectory file, as the paper's data can be had.
+
     Example: multimodal-to audit results/take-off/trajectory.npz
     """
-    trajectory = Trajectory.load(file)
-    report = audit(load_robot(robot or trajectory.robot), trajectory)
+    report = audit(*_load(file, robot))
     narrow = [Column(title, no_wrap=True) for title in ("property", "worst", "limit", "unit", "knot")]
     table = Table(*narrow, "where", Column(no_wrap=True), box=None, pad_edge=False)
     for finding in report.findings:

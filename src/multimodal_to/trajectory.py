@@ -173,15 +173,7 @@ class Trajectory:
             TrajectoryError: the file is missing, is no such archive, or lacks a quantity.
         """
         source = Path(path)
-        if not source.is_file():
-            raise TrajectoryError(f"no trajectory file '{source}'")
-        if not zipfile.is_zipfile(source):
-            raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it is no .npz archive")
-        try:
-            with np.load(source, allow_pickle=False) as archive:
-                stored = {name: archive[name] for name in archive.files}
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-            raise TrajectoryError(f"'{source}' is not a trajectory file of this library: {error}") from error
+        stored = read_archive(source)
         version = stored.get("format_version")
         if version is None or version.shape != () or version.dtype.kind not in "iu":
             raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it has no format_version")
@@ -197,3 +189,20 @@ class Trajectory:
         fields |= {name: tuple(str(label) for label in np.atleast_1d(stored[name])) for name in _LABELS}
         fields |= {name: np.asarray(stored[name], dtype=float) for name in ("time", *QUANTITIES)}
         return cls(**fields)
+
+
+def read_archive(source: Path) -> dict[str, np.ndarray]:
+    """Return the arrays of an `.npz` archive by name; nothing that is pickled is read.
+
+    Raises:
+        TrajectoryError: the file is missing or is no such archive.
+    """
+    if not source.is_file():
+        raise TrajectoryError(f"no trajectory file '{source}'")
+    if not zipfile.is_zipfile(source):
+        raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it is no .npz archive")
+    try:
+        with np.load(source, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise TrajectoryError(f"'{source}' is not a trajectory file of this library: {error}") from error

@@ -1,0 +1,58 @@
+"""Trajectories of others: bare arrays under this library's names, as the paper's data, into a `Trajectory`."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from multimodal_to.derived import contact_points
+from multimodal_to.errors import TrajectoryError
+from multimodal_to.models.robot import Robot
+from multimodal_to.trajectory import QUANTITIES, Trajectory, read_archive
+
+COMPUTED = ("contact_positions", "complementarity_slack", "sliding_slack")
+"""What bare arrays need not hold: it follows from the others."""
+
+
+def import_arrays(robot: Robot, path: str | os.PathLike[str]) -> Trajectory:
+    """Read an `.npz` of bare arrays for a robot.
+
+    The archive holds `total_time` [s] and every array of `QUANTITIES` but those of `COMPUTED`, each (dim, knots + 1),
+    in the robot's order of joints, contact points and jets. The contact points come from forward kinematics, the slacks
+    from what they bound on flat ground at height zero: height × normal force and slip × normal force. Base velocities
+    at the first knot, which some files leave without meaning, are kept as they are.
+
+    Raises:
+        TrajectoryError: the file is missing or broken, or lacks an array.
+    """
+    source = Path(path)
+    stored = read_archive(source)
+    wanted = [name for name in ("total_time", *QUANTITIES) if name not in COMPUTED]
+    if missing := [name for name in wanted if name not in stored]:
+        raise TrajectoryError(f"'{source}' lacks {', '.join(missing)}")
+    arrays = {name: np.asarray(stored[name], dtype=float) for name in wanted}
+    count, contacts = arrays["com_position"].shape[-1], len(robot.contacts)
+    bare = Trajectory(
+        robot=robot.name,
+        scenario=source.stem.replace("_", "-"),
+        time=np.linspace(0.0, float(arrays.pop("total_time")), count),
+        joint_names=robot.joint_names,
+        contact_names=robot.contact_names,
+        jet_names=robot.jet_names,
+        contact_positions=np.zeros((3 * contacts, count)),
+        complementarity_slack=np.zeros((contacts, count)),
+        sliding_slack=np.zeros((contacts, count)),
+        **arrays,
+    )
+    points = contact_points(robot, bare)
+    normal = bare.per_contact("contact_forces")[:, 2]
+    slips = np.abs(np.diff(points[:, :, :2], axis=1, prepend=points[:, :1, :2])).max(axis=2)
+    return replace(
+        bare,
+        contact_positions=points.transpose(0, 2, 1).reshape(-1, count),
+        complementarity_slack=np.maximum(points[:, :, 2] * normal, 0.0),
+        sliding_slack=slips * np.maximum(normal, 0.0),
+    )
