@@ -103,8 +103,8 @@ def solve(
     folder = _writable(output or Path("results") / name)
     console = Console(highlight=False, quiet=quiet)
     started = time.perf_counter()
-    the_robot = load_robot(robot)
-    problem = build(the_robot, scenario)
+    problem = build(load_robot(robot), scenario)
+    the_robot = problem.robot  # with the jets that the scenario uses
     console.print(
         f"{scenario.title}: {the_robot.name}, {scenario.knots} knots, {problem.lower.size} variables, "
         f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s",
