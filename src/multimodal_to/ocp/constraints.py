@@ -13,7 +13,6 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam import centroidal as rigid_body
-from multimodal_to.adam.kinematics import forward_kinematics
 from multimodal_to.adam.spatial import SX
 from multimodal_to.models import contact
 from multimodal_to.models.centroidal import momentum_rate, thrust_force
@@ -82,11 +81,7 @@ def angular_momentum_kinematics(knot: Knot, world: World) -> Rows:
 
 def contact_kinematics(knot: Knot, world: World) -> Rows:
     """p_i = fk_i(q) (eq. 17)."""
-    tree = world.robot.kindyn.tree
-    positions = [
-        forward_kinematics(tree, tree.frame(name), knot.base, knot.joint_positions).translation
-        for name in world.robot.contact_names
-    ]
+    positions = [knot.pose(name).translation for name in world.robot.contact_names]
     return _equal(knot.contact_positions - cs.vertcat(*positions), "m")
 
 
@@ -127,12 +122,7 @@ def contact_reach(knot: Knot, world: World) -> Rows:
 
 def jet_reach(knot: Knot, world: World) -> Rows:
     """|p_j − x| within JET_REACH, by axis, as a fraction of it (with p_j = fk_j(q), eq. 22)."""
-    tree = world.robot.kindyn.tree
-    arms = [
-        (forward_kinematics(tree, tree.frame(jet.frame), knot.base, knot.joint_positions).translation
-         - knot.com_position) / cs.DM(JET_REACH)
-        for jet in world.robot.jets
-    ]  # fmt: skip
+    arms = [(knot.pose(jet.frame).translation - knot.com_position) / cs.DM(JET_REACH) for jet in world.robot.jets]
     return Rows(expression=cs.vertcat(cs.SX(0, 1), *arms), lower=-1.0, upper=1.0, unit="1")
 
 
@@ -228,9 +218,9 @@ def _thrust_acceleration(knot: Knot, world: World) -> SX:
 
 def _momentum_rate(knot: Knot, world: World) -> tuple[SX, SX]:
     """Return m ẍ and ḣω under all contacts and jets."""
-    robot, tree = world.robot, world.robot.kindyn.tree
+    robot = world.robot
     forces = list(zip(knot.points, knot.forces, strict=True))
     for index, jet in enumerate(robot.jets):
-        pose = forward_kinematics(tree, tree.frame(jet.frame), knot.base, knot.joint_positions)
+        pose = knot.pose(jet.frame)
         forces.append((pose.translation, thrust_force(pose.rotation, knot.thrust[index])))
     return momentum_rate(robot.mass, cs.DM(robot.gravity), knot.com_position, forces)

@@ -1,6 +1,6 @@
 """The costs, one residual function each; its name is the name of its weight and of its share in the report.
 
-A cost is weight × |residual|² (× Δt when running); the slack costs are weight × Σ ε (× Δt).
+A cost is weight × |residual|² (× Δt when running); the slack costs are weight × Σ ε, without Δt.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def joint_velocities(start: Knot, end: Knot, dt: SX, world: World) -> SX:
 
 
 def posture(start: Knot, end: Knot, dt: SX, world: World) -> SX:
-    """s − s̄, with the posture in which the robot stands at the start as s̄."""
+    """s − s̄, with the posture in which the robot stands as s̄ (`World.standing`)."""
     return end.joint_positions - cs.DM(world.standing.joint_positions)
 
 

@@ -53,7 +53,7 @@ def standing_posture(robot: Robot, surface: Surface, com: Vector3) -> Posture:
     if not solver.stats()["success"]:
         raise ScenarioError(
             f"no posture of {robot.name} within its joint limits stands on the ground with its CoM at {com} m; "
-            "choose another initial_com"
+            "choose another CoM to stand with"
         )
     values = np.array(result["x"]).ravel()
     return Posture(

@@ -60,7 +60,7 @@ class Problem:
         missed = np.maximum(np.maximum(self.row_lower - g, g - self.row_upper), 0.0)
         report = {name: float(missed[rows.index].max() * rows.scale) for name, rows in self.rows.items()}
         outside = np.maximum(np.maximum(self.lower - x, x - self.upper), 0.0) * self.scale
-        for name, values in self.layout.read(outside[:-1].reshape(self.layout.size, -1, order="F")).items():
+        for name, values in self.layout.read_horizon(outside).items():
             report[f"bounds of {name}"] = float(values.max(initial=0.0))
         report["bounds of interval"] = float(outside[-1])
         return report

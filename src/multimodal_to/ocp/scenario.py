@@ -38,8 +38,8 @@ class Terminal(Enum):
 class Weights:
     """Weight of each cost; a weight of zero adds nothing to the problem.
 
-    Running costs are weight × squared 2-norm × Δt at the end of every interval, except the slacks, which are linear;
-    `final_*` are weight × squared 2-norm at the last knot, without Δt.
+    Running costs are weight × squared 2-norm × Δt at the end of every interval, those of the slacks weight × sum;
+    `initial_posture` and `final_*` are weight × squared 2-norm at that knot. Only the first kind has Δt.
     """
 
     com_velocity: float = 0.0  # ẋ [m/s]
@@ -49,7 +49,7 @@ class Weights:
     base_acceleration: float = 0.0  # v̇, of the base's twist [m/s², rad/s²]
     joint_velocities: Mapping[str, float] = field(default_factory=dict)  # ṡ by joint group [rad/s]
     posture: float = 0.0  # s − s̄ [rad]
-    base_orientation: float = 0.0  # base away from upright, as a quaternion's vector part [1]
+    base_orientation: float = 0.0  # base away from home, as a quaternion's vector part [1]
     contact_forces: float = 0.0  # f [N]
     contact_force_rates: float = 0.0  # ḟ [N/s]
     thrust: float = 0.0  # T [N]

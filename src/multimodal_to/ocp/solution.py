@@ -139,10 +139,7 @@ def _check_bounds(problem: Problem, statistics: dict[str, Any]) -> None:
 def _trajectory(problem: Problem, x: Array) -> Trajectory:
     """Return the trajectory of x: the variables in their own units, and the differences that are their rates."""
     own = x * problem.scale
-    values = {
-        name: np.array(value)
-        for name, value in problem.layout.read(own[:-1].reshape(problem.layout.size, -1, order="F")).items()
-    }
+    values = {name: np.array(value) for name, value in problem.layout.read_horizon(own).items()}
     dt, robot = float(own[-1]), problem.robot
     time_grid: Array = dt * np.arange(problem.scenario.knots + 1, dtype=np.float64)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam import quaternion
-from multimodal_to.adam.kinematics import Pose
+from multimodal_to.adam.kinematics import Pose, forward_kinematics
 from multimodal_to.adam.spatial import SX
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Robot
@@ -76,6 +76,10 @@ class Layout:
         """Return the variables by name from a (size, ...) array or CasADi column in their own units."""
         return {name: values[rows] for name, rows in self.rows.items()}
 
+    def read_horizon(self, x: Array) -> dict[str, Array]:
+        """Return the variables by name, (dim, N + 1) each, from all of them: the knots one after the other, and Δt."""
+        return self.read(x[:-1].reshape(self.size, -1, order="F"))
+
 
 @dataclass(frozen=True)
 class Knot:
@@ -103,6 +107,17 @@ class Knot:
     def base(self) -> Pose:
         """Return w_H_base."""
         return Pose(quaternion.rotation_matrix(self.base_quaternion_xyzw), self.base_position)
+
+    @cached_property
+    def _poses(self) -> dict[str, Pose]:
+        return {}
+
+    def pose(self, frame: str) -> Pose:
+        """Return w_H_frame; each frame's expression is made once."""
+        if frame not in self._poses:
+            tree = self.robot.kindyn.tree
+            self._poses[frame] = forward_kinematics(tree, tree.frame(frame), self.base, self.joint_positions)
+        return self._poses[frame]
 
     @cached_property
     def points(self) -> list[SX]:
