@@ -78,21 +78,50 @@ def audit(robot: Robot, trajectory: Trajectory, surface: Surface | None = None, 
             raise InputError(f"the {label} of the trajectory are {there}; those of {robot.name} are {here}")
     coefficient = robot.friction if friction is None else friction
     phases = flight_phases(trajectory)
-    carried = thrust_forces(robot, trajectory)[1][:, -1, 2].sum()
+    motion = _Motion.of(robot, trajectory)
     return Audit(
         findings=(
-            *_kinematics(robot, trajectory),
-            *_dynamics(robot, trajectory),
-            *_torques(robot, trajectory),
-            *_integration(trajectory),
+            *_kinematics(motion),
+            *_dynamics(motion),
+            *_torques(motion),
+            *_integration(motion),
             *_jets(robot, trajectory),
-            *_contacts(robot, trajectory, surface or FlatGround(), coefficient),
+            *_contacts(motion, surface or FlatGround(), coefficient),
             *_limits(robot, trajectory),
         ),
         duration=trajectory.duration,
         airborne=max((end - start for start, end in phases), default=0.0),
-        final_thrust_over_weight=float(carried / robot.weight),
+        final_thrust_over_weight=float(motion.thrusts[:, -1, 2].sum() / robot.weight),
     )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Motion:
+    """A trajectory with what forward kinematics says of it, in world axes."""
+
+    robot: Robot
+    trajectory: Trajectory
+    base: Array  # w_H_base, (knots + 1, 4, 4)
+    points: Array  # contact points [m], (contacts, knots + 1, 3)
+    thrust_points: Array  # where the jets push [m], (jets, knots + 1, 3)
+    thrusts: Array  # with what force [N], (jets, knots + 1, 3)
+
+    @classmethod
+    def of(cls, robot: Robot, trajectory: Trajectory) -> _Motion:
+        thrust_points, thrusts = thrust_forces(robot, trajectory)
+        return cls(
+            robot=robot,
+            trajectory=trajectory,
+            base=base_poses(trajectory),
+            points=contact_points(robot, trajectory),
+            thrust_points=thrust_points,
+            thrusts=thrusts,
+        )
+
+    @property
+    def contact_forces(self) -> Array:
+        """Return the contact forces [N], (contacts, knots + 1, 3)."""
+        return self.trajectory.per_contact("contact_forces").transpose(0, 2, 1)
 
 
 def _finding(
@@ -114,9 +143,9 @@ def _largest(vectors: Array) -> Array:
     return np.asarray(np.abs(vectors).max(axis=0, initial=0.0))
 
 
-def _kinematics(robot: Robot, trajectory: Trajectory) -> list[Finding]:
-    poses, count = base_poses(trajectory), trajectory.time.size
-    side_by_side = np.hstack(list(poses))
+def _kinematics(motion: _Motion) -> list[Finding]:
+    robot, trajectory, count = motion.robot, motion.trajectory, motion.trajectory.time.size
+    side_by_side = np.hstack(list(motion.base))
     com = np.array(robot.kindyn.CoM_position_fun().map(count)(side_by_side, trajectory.joint_positions))
     matrices = np.array(robot.kindyn.centroidal_momentum_matrix_fun().map(count)(
         side_by_side, trajectory.joint_positions)).reshape(6, count, -1)  # fmt: skip
@@ -124,7 +153,7 @@ def _kinematics(robot: Robot, trajectory: Trajectory) -> list[Finding]:
         trajectory.base_linear_velocity, trajectory.base_angular_velocity, trajectory.joint_velocities
     ])  # fmt: skip
     momentum = np.einsum("rkc,ck->rk", matrices, velocities)
-    points = contact_points(robot, trajectory).transpose(0, 2, 1).reshape(-1, count)
+    points = motion.points.transpose(0, 2, 1).reshape(-1, count)
     norms = np.linalg.norm(trajectory.base_quaternion_xyzw, axis=0)
     by_contact = np.abs(points - trajectory.contact_positions).reshape(len(robot.contacts), 3, count).max(axis=1)
     return [
@@ -136,12 +165,11 @@ def _kinematics(robot: Robot, trajectory: Trajectory) -> list[Finding]:
     ]  # fmt: skip
 
 
-def _dynamics(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+def _dynamics(motion: _Motion) -> list[Finding]:
     """Newton and Euler for the whole robot, at every knot; both rates are zero at the first."""
-    forces = trajectory.per_contact("contact_forces").transpose(0, 2, 1)
-    thrust_points, thrusts = thrust_forces(robot, trajectory)
-    acting = np.concatenate([forces, thrusts])
-    points = np.concatenate([contact_points(robot, trajectory), thrust_points])
+    robot, trajectory = motion.robot, motion.trajectory
+    acting = np.concatenate([motion.contact_forces, motion.thrusts])
+    points = np.concatenate([motion.points, motion.thrust_points])
     linear = acting.sum(axis=0) + robot.mass * robot.gravity - robot.mass * trajectory.com_acceleration.T
     moments = np.cross(points - trajectory.com_position.T, acting).sum(axis=0)
     return [
@@ -150,23 +178,23 @@ def _dynamics(robot: Robot, trajectory: Trajectory) -> list[Finding]:
     ]
 
 
-def _torques(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+def _torques(motion: _Motion) -> list[Finding]:
     """RNEA along the motion under all contact forces and thrusts: joint torques, and what is left for the base.
 
     Accelerations are backward differences of the velocities, as the optimiser's backward Euler has them; placeholders
     of effort limits limit nothing.
     """
-    count = trajectory.time.size
+    robot, trajectory, count = motion.robot, motion.trajectory, motion.trajectory.time.size
     velocities = np.vstack([
         trajectory.base_linear_velocity, trajectory.base_angular_velocity, trajectory.joint_velocities
     ])  # fmt: skip
     steps = np.diff(trajectory.time, prepend=trajectory.time[0] - 1.0)
     accelerations = np.diff(velocities, axis=1, prepend=velocities[:, :1]) / steps
     frames = (*robot.contact_names, *(jet.frame for jet in robot.jets))
-    forces = [*trajectory.per_contact("contact_forces"), *(force.T for force in thrust_forces(robot, trajectory)[1])]
+    forces = [*trajectory.per_contact("contact_forces"), *motion.thrusts.transpose(0, 2, 1)]
     generalised = np.array(
         robot.kindyn.rnea_fun(frames).map(count)(
-            np.hstack(list(base_poses(trajectory))), trajectory.joint_positions, velocities[:6],
+            np.hstack(list(motion.base)), trajectory.joint_positions, velocities[:6],
             trajectory.joint_velocities, accelerations[:6], accelerations[6:],
             *(np.vstack([force, np.zeros((3, count))]) for force in forces),
         )
@@ -180,9 +208,9 @@ def _torques(robot: Robot, trajectory: Trajectory) -> list[Finding]:
     ]
 
 
-def _integration(trajectory: Trajectory) -> list[Finding]:
+def _integration(motion: _Motion) -> list[Finding]:
     """Backward Euler: what a quantity gains over an interval is its rate at the end times Δt."""
-    steps = np.diff(trajectory.time)
+    trajectory, steps = motion.trajectory, np.diff(motion.trajectory.time)
     findings = []
     for name, rate, unit, limit in (
         ("com_position", "com_velocity", "m", 1e-5),
@@ -196,7 +224,7 @@ def _integration(trajectory: Trajectory) -> list[Finding]:
     ):
         gaps = np.diff(getattr(trajectory, name), axis=1) - getattr(trajectory, rate)[:, 1:] * steps
         findings.append(_finding(f"gap of {name}", unit, limit, _largest(gaps), first=1))
-    rotations = base_poses(trajectory)[:, :3, :3]
+    rotations = motion.base[:, :3, :3]
     turned = rotations[1:] @ rotations[:-1].transpose(0, 2, 1)
     gaps = turned - _rodrigues(trajectory.base_angular_velocity[:, 1:].T * steps[:, None])
     findings.append(_finding("gap of base orientation", "rad", 1e-5, np.abs(gaps).max(axis=(1, 2)), first=1))
@@ -223,9 +251,8 @@ def _jets(robot: Robot, trajectory: Trajectory) -> list[Finding]:
     return [_finding("thrust dynamics", "N/s²", 1e-3, residuals, robot.jet_names)]
 
 
-def _contacts(robot: Robot, trajectory: Trajectory, surface: Surface, friction: float) -> list[Finding]:
-    points = contact_points(robot, trajectory)
-    forces = trajectory.per_contact("contact_forces").transpose(0, 2, 1)
+def _contacts(motion: _Motion, surface: Surface, friction: float) -> list[Finding]:
+    points, forces = motion.points, motion.contact_forces
     shape = points.shape[:2]
     heights, normal, along, slips = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
     for index in np.ndindex(*shape):
@@ -236,7 +263,7 @@ def _contacts(robot: Robot, trajectory: Trajectory, surface: Surface, friction: 
         along[index] = np.abs(tangents.T @ forces[index]).max()
         if index[1] > 0:
             slips[index] = np.linalg.norm(tangents.T @ (point - points[index[0], index[1] - 1]))
-    names = robot.contact_names
+    names = motion.robot.contact_names
     return [
         _finding("penetration", "m", 1e-5, -heights, names),
         _finding("pulling normal force", "N", 1e-3, -normal, names),

@@ -112,8 +112,8 @@ def solve(
     )
     with _Progress(console) as progress:
         solution = run_solver(problem, solver, progress)
-    findings = audit(the_robot, solution.trajectory, scenario.surface, scenario.friction)
-    _summarise(console, solution, findings)
+    report = audit(the_robot, solution.trajectory, scenario.surface, scenario.friction)
+    _summarise(console, solution, report)
 
     from multimodal_to.plotting import plot_forces  # viewers take a second to import, other commands need none
     from multimodal_to.replay import write_html
