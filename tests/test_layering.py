@@ -12,6 +12,7 @@ import multimodal_to
 ROOT = Path(multimodal_to.__file__).parent
 FLOORS = [
     {"errors"},
+    {"writing"},
     {"trajectory"},
     {"adam"},
     {"models"},
@@ -19,6 +20,7 @@ FLOORS = [
     {"scenarios"},
     {"derived"},
     {"audit", "replay", "plotting", "importing"},
+    {"report", "export"},
     {"cli", "__init__"},
     {"__main__"},
 ]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import signal
 import sys
 import time
+import warnings
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -22,7 +23,7 @@ from rich.text import Text
 
 from multimodal_to.adam.inspection import describe
 from multimodal_to.audit import Audit, audit
-from multimodal_to.errors import MultimodalError, OutputError
+from multimodal_to.errors import InputError, MultimodalError, OutputError
 from multimodal_to.importing import import_arrays
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.ocp import Ipopt, Iterate, Solution, build
@@ -48,6 +49,7 @@ RobotOption = Annotated[str, typer.Option("--robot", help="Bundled robot by name
 
 def main() -> None:
     """Run the command line; errors of the library end in one sentence and exit status 2."""
+    warnings.showwarning = _show_warning  # type: ignore[assignment]
     try:
         app()
     except MultimodalError as error:
@@ -163,21 +165,39 @@ def plot(
 def replay(
     file: File,
     html: Annotated[Path | None, typer.Option(help="Write a page that opens from disk, without a server.")] = None,
+    gif: Annotated[Path | None, typer.Option(help="Write a GIF that repeats.")] = None,
+    mp4: Annotated[Path | None, typer.Option(help="Write an MP4 film.")] = None,
+    snapshots: Annotated[Path | None, typer.Option(help="Write a PNG of the robot at several times.")] = None,
+    times: Annotated[str, typer.Option(help="Times of the snapshots [s], as 0,2.5,7.")] = "",
+    fps: Annotated[float | None, typer.Option(help="Frames a second. [GIF 12.5, MP4 25]")] = None,
+    meshes: Annotated[bool, typer.Option(help="Draw meshes where the robot has them.")] = True,
     robot: RobotOption = "",
 ) -> None:
-    """Replay a trajectory in the browser, live or as a page.
+    """Replay a trajectory in the browser, live or as a page, or render it; GIF, MP4 and PNG need Chromium or Chrome.
 
-    Example: multimodal-to replay results/take-off/trajectory.npz --html take-off.html
+    Example: multimodal-to replay results/take-off/trajectory.npz --html take-off.html --gif take-off.gif
     """
     the_robot, trajectory = _load(file, robot)
-    if html is not None:
-        _writable(html.parent)
-    from multimodal_to.replay import show, write_html
+    instants = _numbers("--times", times) if times else None
+    wanted = {".html": html, ".png": snapshots, ".gif": gif, ".mp4": mp4}
+    targets = {suffix: path for suffix, path in wanted.items() if path is not None}
+    for suffix, path in targets.items():
+        if path.suffix.lower() != suffix:
+            raise OutputError(f"'{path}' is no {suffix}")
+        _writable(path.parent)
+    from multimodal_to.replay import show, write_gif, write_html, write_mp4, write_snapshots
 
-    if html is not None:
-        _out.print(f"wrote {write_html(the_robot, trajectory, html)}", soft_wrap=True)
+    write = {
+        ".html": lambda path: write_html(the_robot, trajectory, path, meshes=meshes),
+        ".png": lambda path: write_snapshots(the_robot, trajectory, path, times=instants, meshes=meshes),
+        ".gif": lambda path: write_gif(the_robot, trajectory, path, rate=12.5 if fps is None else fps, meshes=meshes),
+        ".mp4": lambda path: write_mp4(the_robot, trajectory, path, rate=25.0 if fps is None else fps, meshes=meshes),
+    }
+    for suffix, path in targets.items():
+        _out.print(f"wrote {write[suffix](path)}", soft_wrap=True)
+    if targets:
         return
-    visualizer = show(the_robot, trajectory)
+    visualizer = show(the_robot, trajectory, meshes=meshes)
     _out.print(f"replaying at {visualizer.url()}; Ctrl-C ends", soft_wrap=True)
     visualizer.open()
     try:
@@ -221,6 +241,17 @@ def audit_file(file: File, robot: RobotOption = "") -> None:
     _out.print(table)
     _out.print(_describe(report))
     raise typer.Exit(0 if report.holds else 1)
+
+
+def _numbers(option: str, text: str) -> list[float]:
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError as error:
+        raise InputError(f"{option} is '{text}'; expected numbers with commas between them") from error
+
+
+def _show_warning(message: Warning | str, *_: object) -> None:
+    Console(stderr=True, highlight=False).print(f"warning: {message}", markup=False, soft_wrap=True)
 
 
 def _writable(folder: Path) -> Path:
