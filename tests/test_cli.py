@@ -86,6 +86,15 @@ def test_plot_and_replay_read_a_saved_file(file, tmp_path):
     assert (tmp_path / "page.html").stat().st_size > 800_000  # the viewer is inside
 
 
+def test_all_figures_of_two_files_are_plotted_under_names_of_their_own(file, tmp_path):
+    other = tmp_path / "again.npz"
+    other.write_bytes(file.read_bytes())
+    result = run("plot", file, other, "--figure", "all", "--output", tmp_path / "both.png")
+    assert result.returncode == 0
+    names = sorted(path.stem.removeprefix("both-") for path in tmp_path.glob("*.png"))
+    assert names == ["com", "contacts", "forces", "joints", "margins", "momentum", "torques"]
+
+
 def test_audit_says_what_fails_and_leaves_with_one(file):
     result = run("audit", file)  # a drawn motion, not a true one
     assert result.returncode == 1
@@ -109,6 +118,8 @@ def test_bare_arrays_are_audited_once_their_robot_is_named(file, tmp_path):
         (("solve", "take-off", "--robot", "ironcup"), "unknown robot 'ironcup'; did you mean 'ironcub'?"),
         (("solve", "take-off", "--max-iterations", "0"), "max_iterations is 0; expected a positive number"),
         (("plot", "none.npz"), "no trajectory file 'none.npz'"),
+        (("plot", "none.npz", "--figure", "force"), "unknown figure 'force'; did you mean 'forces'?"),
+        (("replay", "none.npz", "--gif", "film.mp4"), "no trajectory file"),
         (("replay", "none.npz"), "no trajectory file 'none.npz'"),
         (("audit", "none.npz"), "no trajectory file 'none.npz'"),
         (("robot", "info", "none.urdf"), "unknown robot 'none.urdf'"),

@@ -23,7 +23,7 @@ from rich.text import Text
 
 from multimodal_to.adam.inspection import describe
 from multimodal_to.audit import Audit, audit
-from multimodal_to.errors import InputError, MultimodalError, OutputError
+from multimodal_to.errors import InputError, MultimodalError, OutputError, unknown
 from multimodal_to.importing import import_arrays
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.ocp import Ipopt, Iterate, Solution, build
@@ -117,11 +117,11 @@ def solve(
     report = audit(the_robot, solution.trajectory, scenario.surface, scenario.friction)
     _summarise(console, solution, report)
 
-    from multimodal_to.plotting import plot_forces  # viewers take a second to import, other commands need none
+    from multimodal_to.plotting import plot_forces, save  # viewers take a second to import, other commands need none
     from multimodal_to.replay import write_html
 
-    written = [solution.trajectory.save(folder / "trajectory.npz"), folder / "forces.png"]
-    plot_forces(the_robot, solution.trajectory).savefig(written[1], dpi=150)
+    written = [solution.trajectory.save(folder / "trajectory.npz")]
+    written.append(save(plot_forces(the_robot, solution.trajectory), folder / "forces.png"))
     written.append(write_html(the_robot, solution.trajectory, folder / "replay.html"))
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)
@@ -140,25 +140,45 @@ def _load(file: Path, robot: str) -> tuple[Robot, Trajectory]:
 
 @app.command()
 def plot(
-    file: File,
+    files: Annotated[list[Path], typer.Argument(help="Trajectory files; several are drawn in one figure.")],
+    figure: Annotated[
+        str, typer.Option(help="forces, com, momentum, joints, torques, contacts, margins, or all of them.")
+    ] = "forces",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Picture: .png, .svg or .pdf. [FILE with .png]")
+        Path | None,
+        typer.Option("--output", "-o", help="Picture: .png, .svg or .pdf; of all, the start of the names. [FILE.png]"),
     ] = None,
     robot: RobotOption = "",
 ) -> None:
-    """Plot throttle, thrust and contact force of a trajectory.
+    """Plot a trajectory, or several to compare, with limits dashed and flight in red.
 
-    Example: multimodal-to plot results/take-off/trajectory.npz --output forces.svg
+    Example: multimodal-to plot results/take-off/trajectory.npz --figure com --output com.svg
     """
-    the_robot, trajectory = _load(file, robot)
-    target = output or file.with_suffix(".png")
-    if target.suffix not in (".png", ".svg", ".pdf"):
-        raise OutputError(f"'{target}' is no .png, .svg or .pdf")
-    _writable(target.parent)
-    from multimodal_to.plotting import plot_forces
+    from multimodal_to.plotting import FIGURES, SUFFIXES, save
+    from multimodal_to.plotting import plot as draw
 
-    plot_forces(the_robot, trajectory).savefig(target, dpi=150)
-    _out.print(f"wrote {target}", soft_wrap=True)
+    target = output or files[0].with_suffix(".png")
+    if target.suffix.lower() not in SUFFIXES:
+        raise OutputError(f"'{target}' is no .png, .svg or .pdf")
+    if figure not in (*FIGURES, "all"):
+        raise InputError(unknown("figure", figure, (*FIGURES, "all")))
+    loaded = [_load(file, robot) for file in files]
+    the_robot = load_robot(robot or loaded[0][1].robot)
+    trajectories = [trajectory for _, trajectory in loaded]
+    _writable(target.parent)
+    for name in FIGURES if figure == "all" else (figure,):
+        path = target.with_stem(f"{target.stem}-{name}") if figure == "all" else target
+        drawn = draw(name, the_robot, *trajectories, labels=_labels(files, trajectories))
+        _out.print(f"wrote {save(drawn, path)}", soft_wrap=True)
+
+
+def _labels(files: list[Path], trajectories: list[Trajectory]) -> list[str]:
+    """Return a short name for each file: its scenario, or its path where two are of one scenario."""
+    scenarios = [trajectory.scenario for trajectory in trajectories]
+    return [
+        scenario if scenarios.count(scenario) == 1 else str(file)
+        for scenario, file in zip(scenarios, files, strict=True)
+    ]
 
 
 @app.command()

@@ -101,3 +101,26 @@ def _slerp(start: Array, end: Array, share: Array) -> Array:
     weights = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / sine)
     mixed = weights * start + np.where(near, share, np.sin(share * angle) / sine) * end
     return np.asarray(mixed / np.linalg.norm(mixed, axis=0))
+
+
+def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
+    """Return what the motion asks of base and joints under all contact forces and thrusts, (6 + n, knots + 1).
+
+    τ = M ν̇ + C ν + g − Σ Jᵀ f by RNEA: the wrench left for the base [N, N m], which is zero on a true motion, then the
+    joint torques [N m]. Accelerations are backward differences of the velocities, zero at the first knot.
+    """
+    count = trajectory.time.size
+    velocities = np.vstack([
+        trajectory.base_linear_velocity, trajectory.base_angular_velocity, trajectory.joint_velocities
+    ])  # fmt: skip
+    steps = np.diff(trajectory.time, prepend=trajectory.time[0] - 1.0)
+    accelerations = np.diff(velocities, axis=1, prepend=velocities[:, :1]) / steps
+    frames = (*trajectory.contact_names, *(jet.frame for jet in robot.jets))
+    thrusts = thrust_forces(robot, trajectory)[1].transpose(0, 2, 1)
+    forces = [*trajectory.per_contact("contact_forces"), *thrusts]
+    return np.array(
+        robot.kindyn.rnea_fun(frames).map(count)(
+            np.hstack(list(base_poses(trajectory))), trajectory.joint_positions, velocities[:6], velocities[6:],
+            accelerations[:6], accelerations[6:], *(np.vstack([force, np.zeros((3, count))]) for force in forces),
+        )
+    )  # fmt: skip
