@@ -17,13 +17,14 @@ FLOORS = [
     {"models"},
     {"ocp"},
     {"scenarios"},
-    {"derived"},
+    {"scenario_files", "derived"},
     {"audit", "replay", "plotting", "importing"},
     {"cli", "__init__"},
     {"__main__"},
 ]
 OCP_FLOORS = [
     {"scenario"},
+    {"scenario_data"},
     {"variables", "integrators"},
     {"constraints", "guess"},
     {"costs", "boundary"},

@@ -6,6 +6,7 @@ CoM and angular momentum from its mass-matrix side (J_CMM), not from the recursi
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +14,19 @@ import numpy as np
 from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
 from multimodal_to.derived import base_poses, contact_points, flight_phases, thrust_forces
 from multimodal_to.errors import InputError
+from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
-from multimodal_to.models.terrain import FlatGround, Surface
+from multimodal_to.models.terrain import FlatGround, Surface, frame_function
+from multimodal_to.ocp.scenario import Scenario
+from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.trajectory import Array, Trajectory
 
 LOADED = 5.0
 """A contact point carries load above this normal force [N]."""
+
+
+FRICTION_LIMIT = {FrictionCone.PYRAMID: 1e-3, FrictionCone.SECOND_ORDER: 1e-2}
+"""By how much a force may be outside its cone [N]; a row of squares is met less sharply where the forces vanish."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,14 +65,14 @@ class Audit:
         return {finding.name: finding for finding in self.findings}[name]
 
 
-def audit(robot: Robot, trajectory: Trajectory, surface: Surface | None = None, friction: float | None = None) -> Audit:
+def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None) -> Audit:
     """Check a trajectory against the physics of its robot.
 
     Args:
         robot: the robot that the trajectory is for.
         trajectory: as loaded from its file.
-        surface: the ground; flat at height zero by default.
-        friction: Coulomb coefficient; the robot's own by default.
+        scenario: what was asked, with its terrain and friction; by default the one that the trajectory keeps. If it
+            keeps none, the ground is taken as flat at height zero, with the robot's own friction as a pyramid.
 
     Raises:
         InputError: the trajectory is for another robot.
@@ -76,7 +84,7 @@ def audit(robot: Robot, trajectory: Trajectory, surface: Surface | None = None, 
     ):
         if here != there:
             raise InputError(f"the {label} of the trajectory are {there}; those of {robot.name} are {here}")
-    coefficient = robot.friction if friction is None else friction
+    scenario = scenario or stored(trajectory)
     phases = flight_phases(trajectory)
     motion = _Motion.of(robot, trajectory)
     return Audit(
@@ -86,7 +94,7 @@ def audit(robot: Robot, trajectory: Trajectory, surface: Surface | None = None, 
             *_torques(motion),
             *_integration(motion),
             *_jets(robot, trajectory),
-            *_contacts(motion, surface or FlatGround(), coefficient),
+            *_contacts(motion, scenario),
             *_limits(robot, trajectory),
         ),
         duration=trajectory.duration,
@@ -251,26 +259,32 @@ def _jets(robot: Robot, trajectory: Trajectory) -> list[Finding]:
     return [_finding("thrust dynamics", "N/s²", 1e-3, residuals, robot.jet_names)]
 
 
-def _contacts(motion: _Motion, surface: Surface, friction: float) -> list[Finding]:
+def _contacts(motion: _Motion, scenario: Scenario | None) -> list[Finding]:
+    surface = scenario.surface if scenario else FlatGround()
+    friction = (scenario.friction if scenario else None) or motion.robot.friction
+    cone = scenario.friction_cone if scenario else FrictionCone.PYRAMID
     points, forces = motion.points, motion.contact_forces
-    shape = points.shape[:2]
-    heights, normal, along, slips = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    for index in np.ndindex(*shape):
-        point = points[index]
-        tangents = np.array(surface.tangents(point))
-        heights[index] = float(surface.distance(point))
-        normal[index] = float(np.array(surface.normal(point)).ravel() @ forces[index])
-        along[index] = np.abs(tangents.T @ forces[index]).max()
-        if index[1] > 0:
-            slips[index] = np.linalg.norm(tangents.T @ (point - points[index[0], index[1] - 1]))
+    heights, normals, tangents = _frames(surface, points)
+    normal = np.einsum("ckx,ckx->ck", normals, forces)
+    along = np.einsum("ckxt,ckx->ckt", tangents, forces)
+    reached = np.abs(along).max(axis=2) if cone is FrictionCone.PYRAMID else np.linalg.norm(along, axis=2)
+    moves = np.diff(points, axis=1, prepend=points[:, :1])
+    slips = np.linalg.norm(np.einsum("ckxt,ckx->ckt", tangents, moves), axis=2)
     names = motion.robot.contact_names
     return [
         _finding("penetration", "m", 1e-5, -heights, names),
         _finding("pulling normal force", "N", 1e-3, -normal, names),
-        _finding("friction beyond pyramid", "N", 1e-3, along - friction * normal, names),
+        _finding("friction beyond cone", "N", FRICTION_LIMIT[cone], reached - friction * normal, names),
         _finding("normal force × height", "N m", 0.01, normal * heights, names),
         _finding("slip under load", "m", 1e-3, np.where(normal > LOADED, slips, 0.0), names),
     ]
+
+
+def _frames(surface: Surface, points: Array) -> tuple[Array, Array, Array]:
+    """Return d (...), n (..., 3) and t (..., 3, 2) of a surface at points (..., 3)."""
+    shape, count = points.shape[:-1], math.prod(points.shape[:-1])
+    d, n, t = (np.array(part) for part in frame_function(surface).map(count)(points.reshape(count, 3).T))
+    return d.reshape(shape), n.T.reshape(*shape, 3), t.reshape(3, count, 2).transpose(1, 0, 2).reshape(*shape, 3, 2)
 
 
 def _limits(robot: Robot, trajectory: Trajectory) -> list[Finding]:
