@@ -17,7 +17,7 @@ FLOORS = [
     {"models"},
     {"ocp"},
     {"scenarios"},
-    {"scenario_files", "derived"},
+    {"scenario_files", "derived", "terrain_mesh"},
     {"audit", "replay", "plotting", "importing"},
     {"cli", "__init__"},
     {"__main__"},

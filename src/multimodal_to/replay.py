@@ -26,6 +26,9 @@ import yourdfpy
 from multimodal_to.derived import frame_poses
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.terrain import FlatGround
+from multimodal_to.ocp.scenario_data import stored
+from multimodal_to.terrain_mesh import Patch, patch
 from multimodal_to.trajectory import Array, Trajectory
 
 with warnings.catch_warnings():  # meshcat imports a module of pyzmq that says it is deprecated
@@ -50,6 +53,7 @@ _NOZZLE_RADIUS = 0.033  # of the flame of the strongest jet [m]
 _FULL_WIDTH_LENGTH = 0.08  # arrows and flames shorter than this are also thinner [m]
 _STILL = 1e-9  # a property that changes less than this needs no keyframes
 _GRID_SPACING, _GRID_CELLS = 0.25, 16  # of the ground around the motion, in cells from its middle [m]
+_TERRAIN_AROUND = 2.0  # how far terrain is drawn beyond the motion [m]
 _CAMERA_DIRECTION = np.array([-0.72, -0.66, 0.22])  # from the middle of the motion: half left of a robot that faces −x
 _CAMERA_ZOOM = 1.75
 _CAMERA_DISTANCE = 1.55  # per metre of height or width that must be seen
@@ -174,14 +178,19 @@ def _draw_stage(scene: _Scene, trajectory: Trajectory) -> None:
     extent, top = float((high - low)[:2].max()), float(high[2] + _HEAD_ABOVE_COM * low[2])
     middle = np.array([*(low + high)[:2] / 2, top / 2])
     visualizer.set_transform(_translation(-middle))  # the viewer's camera turns about the origin: put the motion there
-    ground = np.array([*np.round(middle[:2] / _GRID_SPACING) * _GRID_SPACING, 0.0])
-    cells = _GRID_CELLS + math.ceil(extent / 2 / _GRID_SPACING)
-    disc, grey = shapes.Cylinder(0.02, 1.6 * cells * _GRID_SPACING), shapes.MeshLambertMaterial(color=0xB4BDC7)
-    scene.add("ground/disc", disc, grey, _translation([ground[0], ground[1], -0.012]) @ _Y_TO_Z)
-    scene.set_shadow("/meshcat/ground/disc", False)
-    faint = shapes.LineBasicMaterial(color=0x7F8B98, opacity=0.45)
-    grid = shapes.LineSegments(shapes.PointsGeometry(_grid(cells)), faint)
-    scene.add("ground/grid", grid, None, _translation(ground))
+    scenario = stored(trajectory)
+    surface = scenario.surface if scenario else FlatGround()
+    if isinstance(surface, FlatGround):
+        ground = np.array([*np.round(middle[:2] / _GRID_SPACING) * _GRID_SPACING, surface.height])
+        cells = _GRID_CELLS + math.ceil(extent / 2 / _GRID_SPACING)
+        disc, grey = shapes.Cylinder(0.02, 1.6 * cells * _GRID_SPACING), shapes.MeshLambertMaterial(color=0xB4BDC7)
+        scene.add("ground/disc", disc, grey, _translation(ground - [0.0, 0.0, 0.012]) @ _Y_TO_Z)
+        scene.set_shadow("/meshcat/ground/disc", False)
+        faint = shapes.LineBasicMaterial(color=0x7F8B98, opacity=0.45)
+        grid = shapes.LineSegments(shapes.PointsGeometry(_grid(cells)), faint)
+        scene.add("ground/grid", grid, None, _translation(ground))
+    else:
+        _draw_terrain(scene, patch(surface, middle[:2], extent / 2 + _TERRAIN_AROUND))
 
     for light, intensity in (("AmbientLight", 0.6), ("FillLight", 0.2), ("PointLightPositiveX", 0.35)):
         visualizer[f"/Lights/{light}/<object>"].set_property("intensity", intensity)
@@ -194,6 +203,17 @@ def _draw_stage(scene: _Scene, trajectory: Trajectory) -> None:
     camera = visualizer["/Cameras/default/rotated/<object>"]
     camera.set_property("position", [x, z, -y])  # the camera's axes have y up
     camera.set_property("zoom", _CAMERA_ZOOM)
+
+
+def _draw_terrain(scene: _Scene, terrain: Patch) -> None:
+    """Draw a patch of ground that is not flat, with lines that show its shape."""
+    mesh = shapes.TriangularMeshGeometry(terrain.vertices, terrain.faces)
+    scene.add("ground/terrain", mesh, shapes.MeshLambertMaterial(color=0xB4BDC7), _translation([0.0, 0.0, -0.002]))
+    scene.set_shadow("/meshcat/ground/terrain", False)
+    lines = shapes.LineSegments(
+        shapes.PointsGeometry(terrain.lines), shapes.LineBasicMaterial(color=0x7F8B98, opacity=0.7)
+    )
+    scene.add("ground/lines", lines, None, np.eye(4))
 
 
 def _draw_links(scene: _Scene, robot: Robot, trajectory: Trajectory, urdf: yourdfpy.URDF) -> dict[str, str]:
