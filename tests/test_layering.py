@@ -18,6 +18,8 @@ FLOORS = [
     {"ocp"},
     {"scenarios"},
     {"scenario_files", "derived", "terrain_mesh"},
+    {"findings"},
+    {"audit_task", "audit_thrust"},
     {"audit", "replay", "plotting", "importing"},
     {"cli", "__init__"},
     {"__main__"},

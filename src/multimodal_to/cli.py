@@ -5,14 +5,17 @@ Exit status: 0 when done, 1 when a solve ended without an answer or an audit fou
 
 from __future__ import annotations
 
+import json
+import math
 import signal
 import sys
 import time
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryFile
 from types import FrameType
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -236,14 +239,23 @@ def robot_info(
 
 
 @app.command("audit")
-def audit_file(file: File, robot: RobotOption = "") -> None:
-    """Check from the file alone whether a trajectory is physically true; exit status 1 when it is not.
+def audit_file(
+    file: File,
+    robot: RobotOption = "",
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON, for programs.")] = False,
+) -> None:
+    """Check from the file alone whether a trajectory is physically true and does what its scenario asks.
+
+    Exit status 0 only when every property holds, 1 when one does not.
 
     With --robot it also takes bare arrays under the names of a trajectory file, as the paper's data can be had.
 
     Example: multimodal-to audit results/take-off/trajectory.npz
     """
     report = audit(*_load(file, robot))
+    if as_json:
+        typer.echo(json.dumps(_as_data(report), indent=2, ensure_ascii=False))
+        raise typer.Exit(0 if report.holds else 1)
     narrow = [Column(title, no_wrap=True) for title in ("property", "worst", "limit", "unit", "knot")]
     table = Table(*narrow, "where", Column(no_wrap=True), box=None, pad_edge=False)
     for finding in report.findings:
@@ -252,6 +264,12 @@ def audit_file(file: File, robot: RobotOption = "") -> None:
                       finding.body, verdict)  # fmt: skip
     _out.print(table)
     _out.print(_describe(report))
+    if report.scenario is None:
+        _out.print(
+            "the file keeps no scenario: its start, end and ranges were not judged, the ground was taken as flat, and "
+            "the friction as the robot's own pyramid",
+            soft_wrap=True,
+        )
     raise typer.Exit(0 if report.holds else 1)
 
 
@@ -271,6 +289,21 @@ def _describe(report: Audit) -> str:
         f"{report.duration:.2f} s, longest flight {report.airborne:.2f} s, vertical thrust at the end "
         f"{100 * report.final_thrust_over_weight:.2f} % of the weight"
     )
+
+
+def _as_data(report: Audit) -> dict[str, Any]:
+    """Return an audit as what JSON can hold; a worst value that is not finite becomes null."""
+    return {
+        "holds": report.holds,
+        "scenario": None if report.scenario is None else report.scenario.name,
+        "duration": report.duration,
+        "airborne": report.airborne,
+        "final_thrust_over_weight": report.final_thrust_over_weight,
+        "findings": [
+            asdict(finding) | {"worst": finding.worst if math.isfinite(finding.worst) else None, "holds": finding.holds}
+            for finding in report.findings
+        ],
+    }
 
 
 def _summarise(console: Console, solution: Solution, report: Audit) -> None:
