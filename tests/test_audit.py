@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from multimodal_to import scenarios
 from multimodal_to.audit import audit
 from multimodal_to.errors import InputError
+from multimodal_to.models.contact import FrictionCone
+from multimodal_to.models.terrain import FlatGround, Plane, Stairs
 
 KNOT = 20
 
@@ -37,7 +40,7 @@ def spoil(trajectory, name, row, amount, knot=KNOT):
         ("gap of thrust", "thrust_rate", 1, 1.0),
         ("thrust dynamics", "throttle", 1, -1.0),
         ("pulling normal force", "contact_forces", 2, -500.0),
-        ("friction beyond pyramid", "contact_forces", 0, 100.0),
+        ("friction beyond cone", "contact_forces", 0, 100.0),
         ("joint range", "joint_positions", 14, 3.0),
         ("joint speed", "joint_velocities", 3, 10.0),
         ("thrust range", "thrust", 2, 300.0),
@@ -61,6 +64,35 @@ def test_a_robot_that_is_moved_under_load_is_found(ironcub, take_off, property_n
     assert not report[property_name].holds
     assert report[property_name].knot in (KNOT, KNOT + 1)
     assert not report.holds
+
+
+@pytest.mark.parametrize(
+    ("change", "property_name"),
+    [
+        ({"surface": FlatGround(height=-0.01)}, "normal force × height"),
+        ({"surface": FlatGround(height=0.01)}, "penetration"),
+        ({"surface": Plane(slope=0.4, direction=(-1.0, 0.0))}, "friction beyond cone"),
+        ({"surface": Stairs(edges=(0.0,), heights=(0.0, 0.2), direction=(0.0, 1.0))}, "penetration"),
+        ({"friction": 1e-3}, "friction beyond cone"),
+    ],
+)
+def test_the_ground_and_friction_of_the_scenario_are_the_ones_that_count(ironcub, take_off, change, property_name):
+    scenario = scenarios.take_off()
+    assert audit(ironcub, take_off.trajectory, scenario).holds
+    assert not audit(ironcub, take_off.trajectory, replace(scenario, **change))[property_name].holds
+
+
+def test_a_force_in_a_corner_of_the_pyramid_is_outside_the_second_order_cone(ironcub, take_off):
+    forces = take_off.trajectory.contact_forces.copy()
+    forces[:2, KNOT] = 0.9 * ironcub.friction * forces[2, KNOT]
+    trajectory = replace(take_off.trajectory, contact_forces=forces)
+    scenario = scenarios.take_off()
+    assert audit(ironcub, trajectory, scenario)["friction beyond cone"].holds
+    finding = audit(ironcub, trajectory, replace(scenario, friction_cone=FrictionCone.SECOND_ORDER))[
+        "friction beyond cone"
+    ]
+    assert finding.worst == pytest.approx((0.9 * np.sqrt(2) - 1) * ironcub.friction * forces[2, KNOT])
+    assert (finding.knot, finding.body) == (KNOT, ironcub.contact_names[0])
 
 
 def test_a_trajectory_of_another_robot_is_refused(ironcub, take_off):

@@ -18,7 +18,9 @@ FLOORS = [
     {"models"},
     {"ocp"},
     {"scenarios"},
-    {"derived"},
+    {"scenario_files", "derived", "terrain_mesh"},
+    {"findings"},
+    {"audit_task", "audit_thrust"},
     {"audit", "importing"},
     {"replay", "plotting"},
     {"report", "export"},
@@ -27,6 +29,7 @@ FLOORS = [
 ]
 OCP_FLOORS = [
     {"scenario"},
+    {"scenario_data"},
     {"variables", "integrators"},
     {"constraints", "guess"},
     {"costs", "boundary"},

@@ -9,7 +9,8 @@ import pytest
 from multimodal_to.errors import InputError
 from multimodal_to.models import contact
 from multimodal_to.models.centroidal import momentum_rate, thrust_force
-from multimodal_to.models.terrain import FlatGround
+from multimodal_to.models.contact import FrictionCone
+from multimodal_to.models.terrain import FlatGround, Plane
 
 
 @pytest.mark.parametrize(("jet", "thrust"), [(0, 158.7), (2, 220.2)])
@@ -55,6 +56,41 @@ def test_the_friction_pyramid_is_negative_exactly_outside():
     ):
         faces = np.array(contact.friction_pyramid(ground, cs.DM(point), cs.DM(force), 0.33))
         assert (faces.min() >= 0) == inside
+
+
+def cone_margins(surface, point, force, friction):
+    return tuple(
+        float(cs.mmin(cs.DM(contact.FRICTION[cone](surface, cs.DM(point), cs.DM(force), friction))))
+        for cone in (FrictionCone.PYRAMID, FrictionCone.SECOND_ORDER)
+    )
+
+
+@pytest.mark.parametrize("surface", [FlatGround(), Plane(slope=0.3, direction=(1.0, -0.4))])
+def test_the_cone_lies_in_the_pyramid_and_holds_the_pyramid_of_a_smaller_friction(surface):
+    """Four-sided and circumscribed: cone(μ) ⊂ pyramid(μ), and pyramid(μ / √2) ⊂ cone(μ)."""
+    rng, point, friction = np.random.default_rng(2), np.array([0.1, 0.2, 0.3]), 0.33
+    insides = np.zeros((2, 2), dtype=int)
+    for force in 50 * rng.normal(size=(800, 3)) * [0.3, 0.3, 1.0]:
+        pyramid, cone = cone_margins(surface, point, force, friction)
+        small, _ = cone_margins(surface, point, force, friction / np.sqrt(2))
+        assert cone < 0 or pyramid >= 0
+        assert small < 0 or cone >= -1e-12
+        insides[int(pyramid >= 0), int(cone >= 0)] += 1
+    assert insides[1, 0] > 5  # in the corners of the pyramid
+    assert insides[1, 1] > 50
+    assert insides[0, 1] == 0
+
+
+def test_the_cone_is_round_about_the_normal_and_lets_nothing_pull():
+    plane, friction = Plane(slope=0.5, direction=(0.3, 1.0)), 0.4
+    normal, tangents = np.array(plane.normal(np.zeros(3))).ravel(), np.array(plane.tangents(np.zeros(3)))
+    for angle in np.linspace(0.0, 2 * np.pi, 13):
+        along = tangents @ [np.cos(angle), np.sin(angle)]
+        for load in (0.01, 1.0, 300.0):
+            for share, sign in ((0.999, 1), (1.001, -1)):
+                force = load * (normal + share * friction * along)
+                assert sign * cone_margins(plane, np.zeros(3), force, friction)[1] > 0
+                assert cone_margins(plane, np.zeros(3), -force, friction)[1] < 0
 
 
 def test_complementarity_is_height_times_normal_force():

@@ -10,10 +10,12 @@ import pytest
 import umsgpack
 import yourdfpy
 
-from multimodal_to import replay
+from multimodal_to import replay, scenarios
 from multimodal_to.derived import frame_poses
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import load_robot
+from multimodal_to.models.terrain import Stairs
+from multimodal_to.ocp.scenario_data import to_json
 from multimodal_to.replay import effects, scene
 from multimodal_to.replay import page as pages
 from synthetic import DURATION, KNOTS, take_off
@@ -269,3 +271,15 @@ def test_the_live_viewer_serves_the_same_scene_without_a_word(robot, trajectory,
     assert served.count("fetch(") >= len(stage.objects)
     captured = capfd.readouterr()
     assert captured.out == captured.err == ""
+
+
+def test_ground_that_is_not_flat_is_drawn_as_a_patch_on_its_surface(robot, trajectory, tmp_path):
+    stairs = Stairs(edges=(0.3,), heights=(0.0, 0.1), direction=(-1.0, 0.0))
+    kept = to_json(replace(scenarios.take_off(), surface=stairs))
+    path = replay.write_html(robot, replace(trajectory, scenario_json=kept), tmp_path / "stairs.html")
+    stage = Stage(path.read_text(encoding="utf-8"))
+    assert not [path for path in stage.objects if path.endswith(("ground/disc", "ground/grid"))]
+    (terrain,) = (content for path, content in stage.objects.items() if path.endswith("ground/terrain"))
+    data = terrain["geometries"][0]["data"]["attributes"]["position"]["array"]
+    heights = np.frombuffer(data.data, dtype=np.float32).reshape(-1, 3)[:, 2]
+    assert (heights.min(), heights.max()) == pytest.approx((0.0, 0.1), abs=1e-6)

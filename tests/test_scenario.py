@@ -7,6 +7,7 @@ import pytest
 
 from multimodal_to import scenarios
 from multimodal_to.errors import ModelError, ScenarioError
+from multimodal_to.models.terrain import Plane, Stairs, heights_below
 from multimodal_to.ocp import Weights, build
 from multimodal_to.ocp.guess import base_transform, contact_positions, standing_posture
 from multimodal_to.ocp.variables import ranges
@@ -99,3 +100,25 @@ def test_the_standing_posture_stands_where_it_should(ironcub, scenario):
     assert heights.min() > -1e-8
     assert heights.max() < 2e-6
     assert np.abs(posture.joint_positions - ironcub.home.joint_positions).max() < 0.2
+
+
+@pytest.mark.parametrize(
+    ("surface", "upright"),
+    [
+        (Plane(slope=0.2, direction=(-1.0, 0.0)), True),  # uphill
+        (Plane(slope=0.3, direction=(1.0, 1.0), height=-0.05), True),
+        (Plane(slope=0.6, direction=(0.0, 1.0)), False),  # more than the ankles roll
+        (Stairs(edges=(0.0,), heights=(0.0, 0.05), direction=(0.0, 1.0)), True),  # one foot on the step
+    ],
+)
+def test_a_robot_stands_on_slopes_and_steps_and_tilts_its_base_only_where_it_has_to(ironcub, surface, upright):
+    com = (0.0, 0.0, 0.57)
+    posture = standing_posture(ironcub, surface, com)
+    points = contact_positions(ironcub, posture).reshape(-1, 3).T
+    assert np.abs(points[2] - heights_below(surface, points)).max() < 2e-6
+    found = np.array(ironcub.kindyn.CoM_position(base_transform(posture), posture.joint_positions)).ravel()
+    assert found == pytest.approx(com, abs=1e-8)
+    assert np.linalg.norm(posture.base_quaternion_xyzw) == pytest.approx(1.0)
+    turned = np.abs(posture.base_quaternion_xyzw - ironcub.home.base_quaternion_xyzw).max()
+    assert (turned < 1e-9) == upright
+    assert turned < 0.3

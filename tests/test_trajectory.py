@@ -33,6 +33,19 @@ def test_the_file_holds_no_pickle_and_the_names_that_others_use(trajectory, tmp_
         assert archive["contact_forces"].shape == (24, trajectory.knots + 1)
 
 
+def test_files_of_the_first_version_are_read_and_those_of_a_later_release_refused(trajectory, tmp_path):
+    path = replace(trajectory, scenario_json="{}").save(tmp_path / "motion.npz")
+    with np.load(path) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    assert Trajectory.load(path).scenario_json == "{}"
+    np.savez(path, **{**arrays, "format_version": np.array(3)})
+    with pytest.raises(TrajectoryError, match="has format version 3; this release reads 1 to 2"):
+        Trajectory.load(path)
+    del arrays["scenario_json"]
+    np.savez(path, **{**arrays, "format_version": np.array(1)})
+    assert Trajectory.load(path).scenario_json == ""
+
+
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(TrajectoryError, match="no trajectory file"):
         Trajectory.load(tmp_path / "none.npz")

@@ -90,7 +90,7 @@ def test_every_weight_names_a_cost_and_zero_weights_add_nothing(ironcub, problem
 
 def test_every_set_of_rows_has_the_name_of_its_function(problem):
     assert set(problem.rows) == {
-        "com_kinematics", "angular_momentum_kinematics", "contact_kinematics", "friction_pyramid", "complementarity",
+        "com_kinematics", "angular_momentum_kinematics", "contact_kinematics", "friction_cone", "complementarity",
         "contact_reach", "jet_reach", "static_equilibrium", "momentum_dynamics", "com_integration",
         "base_position_integration", "base_orientation_integration", "joint_integration", "thrust_integration",
         "thrust_dynamics", "sliding",

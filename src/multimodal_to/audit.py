@@ -6,36 +6,30 @@ CoM and angular momentum from its mass-matrix side (J_CMM), not from the recursi
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
-from multimodal_to.derived import base_poses, contact_points, flight_phases, thrust_forces
+from multimodal_to.audit_task import task_findings
+from multimodal_to.audit_thrust import thrust_findings
+from multimodal_to.derived import flight_phases
 from multimodal_to.errors import InputError
+from multimodal_to.findings import Finding, Motion, largest, worst_of
+from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
-from multimodal_to.models.terrain import FlatGround, Surface
+from multimodal_to.models.terrain import FlatGround, Surface, frame_function
+from multimodal_to.ocp.scenario import Scenario
+from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.trajectory import Array, Trajectory
 
 LOADED = 5.0
 """A contact point carries load above this normal force [N]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """One property: its worst value on the horizon, where that is, and the limit it is held to."""
-
-    name: str
-    worst: float
-    unit: str
-    knot: int
-    body: str
-    limit: float
-
-    @property
-    def holds(self) -> bool:
-        """Return whether the worst value is within the limit."""
-        return self.worst <= self.limit
+FRICTION_LIMIT = {FrictionCone.PYRAMID: 1e-3, FrictionCone.SECOND_ORDER: 1e-2}
+"""By how much a force may be outside its cone [N]; a row of squares is met less sharply where the forces vanish."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +37,7 @@ class Audit:
     """The findings by property, and figures that describe the motion."""
 
     findings: tuple[Finding, ...]
+    scenario: Scenario | None  # None: what was asked is not known, so start, end and ranges of the task are not judged
     duration: float  # [s]
     airborne: float  # longest phase of flight [s]
     final_thrust_over_weight: float  # vertical, at the last knot [1]
@@ -57,14 +52,14 @@ class Audit:
         return {finding.name: finding for finding in self.findings}[name]
 
 
-def audit(robot: Robot, trajectory: Trajectory, surface: Surface | None = None, friction: float | None = None) -> Audit:
+def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None) -> Audit:
     """Check a trajectory against the physics of its robot.
 
     Args:
         robot: the robot that the trajectory is for.
         trajectory: as loaded from its file.
-        surface: the ground; flat at height zero by default.
-        friction: Coulomb coefficient; the robot's own by default.
+        scenario: what was asked, with its terrain and friction; by default the one that the trajectory keeps. If it
+            keeps none, the ground is taken as flat at height zero, with the robot's own friction as a pyramid.
 
     Raises:
         InputError: the trajectory is for another robot.
@@ -76,9 +71,9 @@ def audit(robot: Robot, trajectory: Trajectory, surface: Surface | None = None, 
     ):
         if here != there:
             raise InputError(f"the {label} of the trajectory are {there}; those of {robot.name} are {here}")
-    coefficient = robot.friction if friction is None else friction
+    scenario = scenario or stored(trajectory)
     phases = flight_phases(trajectory)
-    motion = _Motion.of(robot, trajectory)
+    motion = Motion.of(robot, trajectory)
     return Audit(
         findings=(
             *_kinematics(motion),
@@ -86,64 +81,19 @@ def audit(robot: Robot, trajectory: Trajectory, surface: Surface | None = None, 
             *_torques(motion),
             *_integration(motion),
             *_jets(robot, trajectory),
-            *_contacts(motion, surface or FlatGround(), coefficient),
+            *_contacts(motion, scenario),
             *_limits(robot, trajectory),
+            *thrust_findings(robot, trajectory),
+            *(task_findings(motion, scenario) if scenario else ()),
         ),
+        scenario=scenario,
         duration=trajectory.duration,
         airborne=max((end - start for start, end in phases), default=0.0),
         final_thrust_over_weight=float(motion.thrusts[:, -1, 2].sum() / robot.weight),
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Motion:
-    """A trajectory with what forward kinematics says of it, in world axes."""
-
-    robot: Robot
-    trajectory: Trajectory
-    base: Array  # w_H_base, (knots + 1, 4, 4)
-    points: Array  # contact points [m], (contacts, knots + 1, 3)
-    thrust_points: Array  # where the jets push [m], (jets, knots + 1, 3)
-    thrusts: Array  # with what force [N], (jets, knots + 1, 3)
-
-    @classmethod
-    def of(cls, robot: Robot, trajectory: Trajectory) -> _Motion:
-        thrust_points, thrusts = thrust_forces(robot, trajectory)
-        return cls(
-            robot=robot,
-            trajectory=trajectory,
-            base=base_poses(trajectory),
-            points=contact_points(robot, trajectory),
-            thrust_points=thrust_points,
-            thrusts=thrusts,
-        )
-
-    @property
-    def contact_forces(self) -> Array:
-        """Return the contact forces [N], (contacts, knots + 1, 3)."""
-        return self.trajectory.per_contact("contact_forces").transpose(0, 2, 1)
-
-
-def _finding(
-    name: str, unit: str, limit: float, values: Array, bodies: tuple[str, ...] = (), first: int = 0
-) -> Finding:
-    """Return the worst of values (bodies, knots from `first`), or (knots,)."""
-    table = np.atleast_2d(values)
-    if not table.size:
-        return Finding(name=name, worst=0.0, unit=unit, knot=first, body="", limit=limit)
-    row, column = np.unravel_index(int(np.argmax(table)), table.shape)
-    body = bodies[row] if bodies else ""
-    return Finding(
-        name=name, worst=float(table[row, column]), unit=unit, knot=int(column) + first, body=body, limit=limit
-    )
-
-
-def _largest(vectors: Array) -> Array:
-    """Return the largest component by absolute value of (components, knots), per knot."""
-    return np.asarray(np.abs(vectors).max(axis=0, initial=0.0))
-
-
-def _kinematics(motion: _Motion) -> list[Finding]:
+def _kinematics(motion: Motion) -> list[Finding]:
     robot, trajectory, count = motion.robot, motion.trajectory, motion.trajectory.time.size
     side_by_side = np.hstack(list(motion.base))
     com = np.array(robot.kindyn.CoM_position_fun().map(count)(side_by_side, trajectory.joint_positions))
@@ -157,15 +107,15 @@ def _kinematics(motion: _Motion) -> list[Finding]:
     norms = np.linalg.norm(trajectory.base_quaternion_xyzw, axis=0)
     by_contact = np.abs(points - trajectory.contact_positions).reshape(len(robot.contacts), 3, count).max(axis=1)
     return [
-        _finding("CoM consistency", "m", 1e-5, _largest(com - trajectory.com_position)),
-        _finding("momentum consistency", "kg m²/s", 1e-4,
-                 _largest(momentum[3:] - trajectory.angular_momentum)),
-        _finding("contact point consistency", "m", 1e-5, by_contact, robot.contact_names),
-        _finding("quaternion norm", "1", 1e-6, np.abs(norms - 1)),
+        worst_of("CoM consistency", "m", 1e-5, largest(com - trajectory.com_position)),
+        worst_of("momentum consistency", "kg m²/s", 1e-4,
+                 largest(momentum[3:] - trajectory.angular_momentum)),
+        worst_of("contact point consistency", "m", 1e-5, by_contact, robot.contact_names),
+        worst_of("quaternion norm", "1", 1e-6, np.abs(norms - 1)),
     ]  # fmt: skip
 
 
-def _dynamics(motion: _Motion) -> list[Finding]:
+def _dynamics(motion: Motion) -> list[Finding]:
     """Newton and Euler for the whole robot, at every knot; both rates are zero at the first."""
     robot, trajectory = motion.robot, motion.trajectory
     acting = np.concatenate([motion.contact_forces, motion.thrusts])
@@ -173,12 +123,12 @@ def _dynamics(motion: _Motion) -> list[Finding]:
     linear = acting.sum(axis=0) + robot.mass * robot.gravity - robot.mass * trajectory.com_acceleration.T
     moments = np.cross(points - trajectory.com_position.T, acting).sum(axis=0)
     return [
-        _finding("force balance", "N", 1e-2, _largest(linear.T)),
-        _finding("moment balance", "N m", 1e-2, _largest(moments.T - trajectory.angular_momentum_rate)),
+        worst_of("force balance", "N", 1e-2, largest(linear.T)),
+        worst_of("moment balance", "N m", 1e-2, largest(moments.T - trajectory.angular_momentum_rate)),
     ]
 
 
-def _torques(motion: _Motion) -> list[Finding]:
+def _torques(motion: Motion) -> list[Finding]:
     """RNEA along the motion under all contact forces and thrusts: joint torques, and what is left for the base.
 
     Accelerations are backward differences of the velocities, as the optimiser's backward Euler has them; placeholders
@@ -202,13 +152,13 @@ def _torques(motion: _Motion) -> list[Finding]:
     effort = np.where(robot.joint_limits.effort < EFFORT_PLACEHOLDER, robot.joint_limits.effort, np.inf)
     beyond = np.abs(generalised[6:]) - effort[:, None]
     return [
-        _finding("torque beyond effort", "N m", 1e-3, beyond, robot.joint_names),
-        _finding("unexplained base force", "N", 0.01 * robot.weight, _largest(generalised[:3])),
-        _finding("unexplained base moment", "N m", 1.0, _largest(generalised[3:6])),
+        worst_of("torque beyond effort", "N m", 1e-3, beyond, robot.joint_names),
+        worst_of("unexplained base force", "N", 0.01 * robot.weight, largest(generalised[:3])),
+        worst_of("unexplained base moment", "N m", 1.0, largest(generalised[3:6])),
     ]
 
 
-def _integration(motion: _Motion) -> list[Finding]:
+def _integration(motion: Motion) -> list[Finding]:
     """Backward Euler: what a quantity gains over an interval is its rate at the end times Δt."""
     trajectory, steps = motion.trajectory, np.diff(motion.trajectory.time)
     findings = []
@@ -223,11 +173,11 @@ def _integration(motion: _Motion) -> list[Finding]:
         ("thrust_rate", "thrust_acceleration", "N/s", 1e-3),
     ):
         gaps = np.diff(getattr(trajectory, name), axis=1) - getattr(trajectory, rate)[:, 1:] * steps
-        findings.append(_finding(f"gap of {name}", unit, limit, _largest(gaps), first=1))
+        findings.append(worst_of(f"gap of {name}", unit, limit, largest(gaps), first=1))
     rotations = motion.base[:, :3, :3]
     turned = rotations[1:] @ rotations[:-1].transpose(0, 2, 1)
     gaps = turned - _rodrigues(trajectory.base_angular_velocity[:, 1:].T * steps[:, None])
-    findings.append(_finding("gap of base orientation", "rad", 1e-5, np.abs(gaps).max(axis=(1, 2)), first=1))
+    findings.append(worst_of("gap of base orientation", "rad", 1e-5, np.abs(gaps).max(axis=(1, 2)), first=1))
     return findings
 
 
@@ -248,29 +198,35 @@ def _jets(robot: Robot, trajectory: Trajectory) -> list[Finding]:
         for row, jet in enumerate(robot.jets)
     ]).reshape(len(robot.jets), trajectory.time.size)  # fmt: skip
     residuals = np.abs(accelerations - trajectory.thrust_acceleration)
-    return [_finding("thrust dynamics", "N/s²", 1e-3, residuals, robot.jet_names)]
+    return [worst_of("thrust dynamics", "N/s²", 1e-3, residuals, robot.jet_names)]
 
 
-def _contacts(motion: _Motion, surface: Surface, friction: float) -> list[Finding]:
+def _contacts(motion: Motion, scenario: Scenario | None) -> list[Finding]:
+    surface = scenario.surface if scenario else FlatGround()
+    friction = (scenario.friction if scenario else None) or motion.robot.friction
+    cone = scenario.friction_cone if scenario else FrictionCone.PYRAMID
     points, forces = motion.points, motion.contact_forces
-    shape = points.shape[:2]
-    heights, normal, along, slips = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    for index in np.ndindex(*shape):
-        point = points[index]
-        tangents = np.array(surface.tangents(point))
-        heights[index] = float(surface.distance(point))
-        normal[index] = float(np.array(surface.normal(point)).ravel() @ forces[index])
-        along[index] = np.abs(tangents.T @ forces[index]).max()
-        if index[1] > 0:
-            slips[index] = np.linalg.norm(tangents.T @ (point - points[index[0], index[1] - 1]))
+    heights, normals, tangents = _frames(surface, points)
+    normal = np.einsum("ckx,ckx->ck", normals, forces)
+    along = np.einsum("ckxt,ckx->ckt", tangents, forces)
+    reached = np.abs(along).max(axis=2) if cone is FrictionCone.PYRAMID else np.linalg.norm(along, axis=2)
+    moves = np.diff(points, axis=1, prepend=points[:, :1])
+    slips = np.linalg.norm(np.einsum("ckxt,ckx->ckt", tangents, moves), axis=2)
     names = motion.robot.contact_names
     return [
-        _finding("penetration", "m", 1e-5, -heights, names),
-        _finding("pulling normal force", "N", 1e-3, -normal, names),
-        _finding("friction beyond pyramid", "N", 1e-3, along - friction * normal, names),
-        _finding("normal force × height", "N m", 0.01, normal * heights, names),
-        _finding("slip under load", "m", 1e-3, np.where(normal > LOADED, slips, 0.0), names),
+        worst_of("penetration", "m", 1e-5, -heights, names),
+        worst_of("pulling normal force", "N", 1e-3, -normal, names),
+        worst_of("friction beyond cone", "N", FRICTION_LIMIT[cone], reached - friction * normal, names),
+        worst_of("normal force × height", "N m", 0.01, normal * heights, names),
+        worst_of("slip under load", "m", 1e-3, np.where(normal > LOADED, slips, 0.0), names),
     ]
+
+
+def _frames(surface: Surface, points: Array) -> tuple[Array, Array, Array]:
+    """Return d (...), n (..., 3) and t (..., 3, 2) of a surface at points (..., 3)."""
+    shape, count = points.shape[:-1], math.prod(points.shape[:-1])
+    d, n, t = (np.array(part) for part in frame_function(surface).map(count)(points.reshape(count, 3).T))
+    return d.reshape(shape), n.T.reshape(*shape, 3), t.reshape(3, count, 2).transpose(1, 0, 2).reshape(*shape, 3, 2)
 
 
 def _limits(robot: Robot, trajectory: Trajectory) -> list[Finding]:
@@ -283,8 +239,8 @@ def _limits(robot: Robot, trajectory: Trajectory) -> list[Finding]:
     highest = np.array([jet.throttle_max for jet in jets]).reshape(-1, 1)
     thrust, throttle = trajectory.thrust, trajectory.throttle
     return [
-        _finding("joint range", "rad", 1e-6, beyond, robot.joint_names),
-        _finding("joint speed", "rad/s", 1e-6, speeds - limits.speed[:, None], robot.joint_names),
-        _finding("thrust range", "N", 1e-4, np.maximum(thrust - thrust_max, -thrust), robot.jet_names),
-        _finding("throttle range", "%", 1e-4, np.maximum(throttle - highest, lowest - throttle), robot.jet_names),
+        worst_of("joint range", "rad", 1e-6, beyond, robot.joint_names),
+        worst_of("joint speed", "rad/s", 1e-6, speeds - limits.speed[:, None], robot.joint_names),
+        worst_of("thrust range", "N", 1e-4, np.maximum(thrust - thrust_max, -thrust), robot.jet_names),
+        worst_of("throttle range", "%", 1e-4, np.maximum(throttle - highest, lowest - throttle), robot.jet_names),
     ]

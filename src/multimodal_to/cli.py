@@ -5,15 +5,18 @@ Exit status: 0 when done, 1 when a solve ended without an answer or an audit fou
 
 from __future__ import annotations
 
+import json
+import math
 import signal
 import sys
 import time
 import warnings
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryFile
 from types import FrameType
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -23,11 +26,14 @@ from rich.text import Text
 
 from multimodal_to.adam.inspection import describe
 from multimodal_to.audit import Audit, audit
-from multimodal_to.errors import InputError, MultimodalError, OutputError, unknown
+from multimodal_to.errors import InputError, MultimodalError, OutputError, ScenarioError, unknown
 from multimodal_to.importing import import_arrays
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.ocp import Ipopt, Iterate, Solution, build
 from multimodal_to.ocp import solve as run_solver
+from multimodal_to.ocp.scenario import Scenario
+from multimodal_to.ocp.scenario_data import stored, to_dict
+from multimodal_to.scenario_files import change, load, to_toml
 from multimodal_to.scenarios import SCENARIOS, find
 from multimodal_to.trajectory import Trajectory, read_archive
 
@@ -44,6 +50,11 @@ _out = Console(highlight=False)
 _LINE_EVERY = 5.0  # [s] between progress lines where the output is no terminal
 
 File = Annotated[Path, typer.Argument(help="Trajectory file, as `solve` writes it.")]
+ScenarioName = Annotated[str, typer.Argument(help="Scenario, as `list` shows it, or a TOML file of one.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in --set final_com_height=0.8; repeatable."),
+]
 RobotOption = Annotated[str, typer.Option("--robot", help="Bundled robot by name, or a robot's folder.")]
 
 
@@ -75,19 +86,43 @@ def _options(
 @app.command("list")
 def list_scenarios() -> None:
     """List the bundled scenarios with their numbers."""
-    table = Table("scenario", "what it does", "knots", "time [s]", "CoM from [m]", "to [m]", "ends", box=None)
+    table = Table("scenario", "what it does", "knots", r"time \[s]", r"CoM from \[m]", r"to \[m]", "starts", "ends",
+                  "jets", "ground", box=None)  # fmt: skip
     for make in SCENARIOS.values():
         scenario = make()
-        shortest, longest = (scenario.knots * bound for bound in (scenario.interval_min, scenario.interval_max))
+        durations = dict.fromkeys(f"{scenario.knots * dt:g}" for dt in (scenario.interval_min, scenario.interval_max))
         start, end = (" ".join(f"{number:g}" for number in com) for com in (scenario.initial_com, scenario.final_com))
-        table.add_row(scenario.name, scenario.title, str(scenario.knots), f"{shortest:g} to {longest:g}", start, end,
-                      scenario.terminal.value)  # fmt: skip
+        if scenario.mid_height_min is not None:
+            end += f", over {scenario.mid_height_min:g}"
+        table.add_row(
+            scenario.name, scenario.title, str(scenario.knots), " to ".join(durations), start, end,
+            scenario.start.value, scenario.terminal.value, "on" if scenario.jets else "off",
+            to_dict(scenario)["surface"]["kind"],
+        )  # fmt: skip
     _out.print(table)
 
 
 @app.command()
+def show(name: ScenarioName, settings: Settings = None) -> None:
+    """Print a scenario as TOML, complete; also the one that a trajectory file was solved from.
+
+    Example: multimodal-to show take-off > my_task.toml
+    """
+    scenario = stored(Trajectory.load(name)) if name.endswith(".npz") else _scenario(name, None)
+    if scenario is None:
+        raise ScenarioError(f"'{name}' keeps no scenario")
+    _out.print(to_toml(change(scenario, settings or ())), markup=False, soft_wrap=True, end="")
+
+
+def _scenario(name: str, settings: list[str] | None) -> Scenario:
+    """Return a bundled scenario or that of a file, with the changes asked for."""
+    return change(load(name) if name.endswith(".toml") else find(name), settings or ())
+
+
+@app.command()
 def solve(
-    name: Annotated[str, typer.Argument(help="Scenario, as `list` shows it.")],
+    name: ScenarioName,
+    settings: Settings = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder for the results; made if missing. [results/NAME]")
     ] = None,
@@ -98,11 +133,11 @@ def solve(
 ) -> None:
     """Solve a scenario; write the trajectory, its plot and its replay page.
 
-    Example: multimodal-to solve take-off --output results/take-off
+    Example: multimodal-to solve take-off --set final_com_height=0.8 --set weights.thrust=3 --output results/higher
     """
-    scenario = find(name)
+    scenario = _scenario(name, settings)
     solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit)
-    folder = _writable(output or Path("results") / name)
+    folder = _writable(output or Path("results") / scenario.name)
     console = Console(highlight=False, quiet=quiet)
     started = time.perf_counter()
     problem = build(load_robot(robot), scenario)
@@ -114,7 +149,7 @@ def solve(
     )
     with _Progress(console) as progress:
         solution = run_solver(problem, solver, progress)
-    report = audit(the_robot, solution.trajectory, scenario.surface, scenario.friction)
+    report = audit(the_robot, solution.trajectory, scenario)
     _summarise(console, solution, report)
 
     from multimodal_to.plotting import plot_forces, save  # viewers take a second to import, other commands need none
@@ -244,14 +279,23 @@ def robot_info(
 
 
 @app.command("audit")
-def audit_file(file: File, robot: RobotOption = "") -> None:
-    """Check from the file alone whether a trajectory is physically true; exit status 1 when it is not.
+def audit_file(
+    file: File,
+    robot: RobotOption = "",
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON, for programs.")] = False,
+) -> None:
+    """Check from the file alone whether a trajectory is physically true and does what its scenario asks.
+
+    Exit status 0 only when every property holds, 1 when one does not.
 
     With --robot it also takes bare arrays under the names of a trajectory file, as the paper's data can be had.
 
     Example: multimodal-to audit results/take-off/trajectory.npz
     """
     report = audit(*_load(file, robot))
+    if as_json:
+        typer.echo(json.dumps(_as_data(report), indent=2, ensure_ascii=False))
+        raise typer.Exit(0 if report.holds else 1)
     narrow = [Column(title, no_wrap=True) for title in ("property", "worst", "limit", "unit", "knot")]
     table = Table(*narrow, "where", Column(no_wrap=True), box=None, pad_edge=False)
     for finding in report.findings:
@@ -260,6 +304,12 @@ def audit_file(file: File, robot: RobotOption = "") -> None:
                       finding.body, verdict)  # fmt: skip
     _out.print(table)
     _out.print(_describe(report))
+    if report.scenario is None:
+        _out.print(
+            "the file keeps no scenario: its start, end and ranges were not judged, the ground was taken as flat, and "
+            "the friction as the robot's own pyramid",
+            soft_wrap=True,
+        )
     raise typer.Exit(0 if report.holds else 1)
 
 
@@ -290,6 +340,21 @@ def _describe(report: Audit) -> str:
         f"{report.duration:.2f} s, longest flight {report.airborne:.2f} s, vertical thrust at the end "
         f"{100 * report.final_thrust_over_weight:.2f} % of the weight"
     )
+
+
+def _as_data(report: Audit) -> dict[str, Any]:
+    """Return an audit as what JSON can hold; a worst value that is not finite becomes null."""
+    return {
+        "holds": report.holds,
+        "scenario": None if report.scenario is None else report.scenario.name,
+        "duration": report.duration,
+        "airborne": report.airborne,
+        "final_thrust_over_weight": report.final_thrust_over_weight,
+        "findings": [
+            asdict(finding) | {"worst": finding.worst if math.isfinite(finding.worst) else None, "holds": finding.holds}
+            for finding in report.findings
+        ],
+    }
 
 
 def _summarise(console: Console, solution: Solution, report: Audit) -> None:

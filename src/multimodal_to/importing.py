@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def import_arrays(robot: Robot, path: str | os.PathLike[str]) -> Trajectory:
     wanted = [name for name in ("total_time", *QUANTITIES) if name not in COMPUTED]
     if missing := [name for name in wanted if name not in stored]:
         raise TrajectoryError(f"'{source}' lacks {', '.join(missing)}")
-    arrays = {name: np.asarray(stored[name], dtype=float) for name in wanted}
+    arrays: dict[str, Any] = {name: np.asarray(stored[name], dtype=float) for name in wanted}
     count, contacts = arrays["com_position"].shape[-1], len(robot.contacts)
     bare = Trajectory(
         robot=robot.name,

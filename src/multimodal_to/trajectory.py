@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from multimodal_to.errors import OutputError, TrajectoryError
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+"""Version 1 lacks `scenario_json`; it is read all the same."""
 
 Array = NDArray[np.float64]
 
@@ -102,6 +103,8 @@ class Trajectory:
     thrust_acceleration: Array
     throttle: Array
 
+    scenario_json: str = ""  # the complete scenario, as `ocp.scenario_data` writes it; empty where none is known
+
     def __post_init__(self) -> None:
         if self.time.ndim != 1 or self.time.size < 2:
             raise TrajectoryError(f"'time' has shape {self.time.shape}; expected (knots + 1,) with at least two knots")
@@ -146,6 +149,7 @@ class Trajectory:
             "format_version": np.array(FORMAT_VERSION),
             "robot": np.array(self.robot),
             "scenario": np.array(self.scenario),
+            "scenario_json": np.array(self.scenario_json),
             "time": self.time,
             "knots": np.array(self.knots),
             "total_time": np.array(self.duration),
@@ -178,8 +182,8 @@ class Trajectory:
         version = stored.get("format_version")
         if version is None or version.shape != () or version.dtype.kind not in "iu":
             raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it has no format_version")
-        if int(version) != FORMAT_VERSION:
-            raise TrajectoryError(f"'{source}' has format version {version}; this release reads {FORMAT_VERSION}")
+        if not 1 <= int(version) <= FORMAT_VERSION:
+            raise TrajectoryError(f"'{source}' has format version {version}; this release reads 1 to {FORMAT_VERSION}")
         wanted = ("robot", "scenario", "time", *_LABELS, *QUANTITIES)
         if missing := [name for name in wanted if name not in stored]:
             raise TrajectoryError(f"'{source}' lacks {', '.join(missing)}")
@@ -187,6 +191,7 @@ class Trajectory:
             if stored[name].dtype.kind not in "fiu":
                 raise TrajectoryError(f"'{source}': '{name}' is not numeric")
         fields: dict[str, Any] = {"robot": str(stored["robot"]), "scenario": str(stored["scenario"])}
+        fields["scenario_json"] = str(stored.get("scenario_json", ""))
         fields |= {name: tuple(str(label) for label in np.atleast_1d(stored[name])) for name in _LABELS}
         fields |= {name: np.asarray(stored[name], dtype=float) for name in ("time", *QUANTITIES)}
         return cls(**fields)

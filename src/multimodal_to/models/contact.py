@@ -7,6 +7,7 @@ Equation numbers are those of L'Erario et al. 2022. Points [m], forces on the ro
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 import casadi as cs
 
@@ -22,6 +23,15 @@ class ContactPoint:
     foot: str
 
 
+class FrictionCone(Enum):
+    """Which forces a contact point can bear without slipping, with the coefficient μ."""
+
+    PYRAMID = "pyramid"
+    """|t·f| ≤ μ n·f for each of the two tangents: four-sided, circumscribed about the cone (eq. 12)."""
+    SECOND_ORDER = "second-order"
+    """‖t·f‖ ≤ μ n·f: Coulomb's round cone."""
+
+
 def normal_force(surface: Surface, point: SX, force: SX) -> SX:
     """Return n(p)ᵀ f [N]."""
     return cs.dot(surface.normal(point), force)
@@ -35,6 +45,23 @@ def friction_pyramid(surface: Surface, point: SX, force: SX, friction: float) ->
     along = surface.tangents(point).T @ force
     reach = friction * normal_force(surface, point, force)
     return cs.vertcat(reach - along, reach + along)
+
+
+CONE_FORCE = 50.0
+"""What the row of the second-order cone is divided by, so that it is in N and of the size of a contact force [N]."""
+
+
+def friction_cone(surface: Surface, point: SX, force: SX, friction: float) -> SX:
+    """Return n·f and ((μ n·f)² − ‖t·f‖²) / `CONE_FORCE` [N], (2, 1), none negative inside the second-order cone.
+
+    Polynomial in the force, so smooth at f = 0 as well, where the norm itself is not; the first row chooses between the
+    two cones of the second.
+    """
+    along, normal = surface.tangents(point).T @ force, normal_force(surface, point, force)
+    return cs.vertcat(normal, ((friction * normal) ** 2 - cs.sumsqr(along)) / CONE_FORCE)
+
+
+FRICTION = {FrictionCone.PYRAMID: friction_pyramid, FrictionCone.SECOND_ORDER: friction_cone}
 
 
 def complementarity(surface: Surface, point: SX, force: SX) -> SX:

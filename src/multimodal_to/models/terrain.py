@@ -1,13 +1,28 @@
-"""Surfaces that the robot stands on: distance d, normal n and tangents t of a point p."""
+"""Surfaces that the robot stands on: distance d, normal n and tangents t of a point p.
+
+All are graphs z = h(x, y) over the horizontal plane, smooth in the sense that each class states.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
 from typing import Protocol
 
 import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import SX
+from multimodal_to.errors import InputError
+from multimodal_to.models import bspline
+
+Array = NDArray[np.float64]
+Vector2 = tuple[float, float]
 
 
 class Surface(Protocol):
@@ -43,3 +58,222 @@ class FlatGround:
     def tangents(self, point: SX) -> SX:
         """Return the world's x and y as columns, (3, 2)."""
         return cs.DM.eye(3)[:, :2]
+
+
+class Relief(ABC):
+    """A surface z = h(x, y) that says its height and slopes; distance, normal and tangents follow.
+
+    d(p) = (z − h) n_z is the signed distance to first order: exact for a plane, and with ∇d = n on the surface itself.
+    """
+
+    @abstractmethod
+    def height_and_slopes(self, x: SX, y: SX) -> tuple[SX, SX, SX]:
+        """Return h [m], ∂h/∂x and ∂h/∂y [1] at x and y [m]."""
+
+    def frame(self, point: SX) -> tuple[SX, SX, SX]:
+        """Return d, n and t from one evaluation of the heights."""
+        height, along_x, along_y = self.height_and_slopes(point[0], point[1])
+        steepness = cs.sqrt(1 + along_x**2 + along_y**2)  # 1 / n_z
+        normal = cs.vertcat(-along_x, -along_y, 1) / steepness
+        first = cs.vertcat(1, 0, along_x) / cs.sqrt(1 + along_x**2)
+        return (point[2] - height) / steepness, normal, cs.horzcat(first, cs.cross(normal, first))
+
+    def distance(self, point: SX) -> SX:
+        """Return (z − h) n_z [m]."""
+        return self.frame(point)[0]
+
+    def normal(self, point: SX) -> SX:
+        """Return (−∂h/∂x, −∂h/∂y, 1) / ‖·‖, (3, 1)."""
+        return self.frame(point)[1]
+
+    def tangents(self, point: SX) -> SX:
+        """Return the way along the world's x, (1, 0, ∂h/∂x) / ‖·‖, and n × that, as columns, (3, 2)."""
+        return self.frame(point)[2]
+
+
+class Remembered:
+    """A surface that makes the expressions of each point once, however many rows ask for them."""
+
+    def __init__(self, surface: Surface) -> None:
+        self._surface = surface
+        self._known: dict[int, tuple[SX, tuple[SX, SX, SX]]] = {}  # with the point, so that its id stays its own
+
+    def _frame(self, point: SX) -> tuple[SX, SX, SX]:
+        if id(point) not in self._known:
+            self._known[id(point)] = point, frame(self._surface, point)
+        return self._known[id(point)][1]
+
+    def distance(self, point: SX) -> SX:
+        """Return d(p) [m]."""
+        return self._frame(point)[0]
+
+    def normal(self, point: SX) -> SX:
+        """Return n(p), (3, 1)."""
+        return self._frame(point)[1]
+
+    def tangents(self, point: SX) -> SX:
+        """Return t(p), (3, 2)."""
+        return self._frame(point)[2]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plane(Relief):
+    """The plane through (0, 0, `height`) that rises by `slope` metres per horizontal metre along `direction`.
+
+    Raises:
+        InputError: a number is not finite, or the direction has no length.
+    """
+
+    slope: float  # tangent of the inclination [1]
+    direction: Vector2 = (1.0, 0.0)  # horizontal, of any length
+    height: float = 0.0  # at the world's origin [m]
+
+    def __post_init__(self) -> None:
+        _finite("slope", self.slope)
+        _finite("height", self.height)
+        _unit(self.direction)
+
+    def height_and_slopes(self, x: SX, y: SX) -> tuple[SX, SX, SX]:
+        """Return h [m] and the constant slopes [1]."""
+        along_x, along_y = (self.slope * part for part in _unit(self.direction))
+        return self.height + along_x * x + along_y * y, along_x, along_y
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stairs(Relief):
+    """Treads at `heights`, each reached from the one before at one of `edges` along `direction`.
+
+    A riser is a ramp of `width`, centred on its edge: rise × σ(u) with σ = 35 u⁴ − 84 u⁵ + 70 u⁶ − 20 u⁷ for u from 0
+    to 1, three times continuously differentiable and exactly flat beyond. A single edge makes a step, down or up.
+
+    Raises:
+        InputError: edges and heights don't fit, the edges don't increase, or ramps would overlap.
+    """
+
+    edges: tuple[float, ...]  # distance from the world's origin along the direction [m]
+    heights: tuple[float, ...]  # of the treads, one more than edges [m]
+    direction: Vector2 = (1.0, 0.0)  # horizontal, of any length
+    width: float = 0.02  # of the ramp that smooths a riser [m]
+
+    def __post_init__(self) -> None:
+        _unit(self.direction)
+        _finite("edges", *self.edges)
+        _finite("heights", *self.heights)
+        if not self.edges or len(self.heights) != len(self.edges) + 1:
+            raise InputError(f"stairs have {len(self.edges)} edges and {len(self.heights)} heights; expected at least "
+                             "one edge, and one height more than edges")  # fmt: skip
+        if not 0 < self.width < math.inf:
+            raise InputError(f"the width of the stairs' ramps is {self.width} m; expected a positive number")
+        if min(np.diff(self.edges), default=math.inf) < self.width:
+            raise InputError(f"the edges of the stairs are {self.edges} m; expected each at least a ramp's width, "
+                             f"{self.width} m, beyond the one before")  # fmt: skip
+
+    def height_and_slopes(self, x: SX, y: SX) -> tuple[SX, SX, SX]:
+        """Return h [m] and the slopes [1]; about 20 operations for each edge."""
+        unit_x, unit_y = _unit(self.direction)
+        along = unit_x * x + unit_y * y
+        height, slope = self.heights[0], 0.0
+        for edge, rise in zip(self.edges, np.diff(self.heights).tolist(), strict=True):
+            u = cs.fmin(cs.fmax((along - edge) / self.width + 0.5, 0), 1)
+            height += rise * u**4 * (35 - u * (84 - u * (70 - 20 * u)))
+            slope += rise / self.width * 140 * (u * (1 - u)) ** 3
+        return height, unit_x * slope, unit_y * slope
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeightField(Relief):
+    """Heights on a regular grid, with a twice continuously differentiable cubic spline between (`models.bspline`).
+
+    Beyond the grid the surface goes on with the slope that it has at the edge. A grid of n by m nodes costs about
+    10 n m operations per contact point, so take the nodes no closer than the terrain needs.
+
+    Raises:
+        InputError: the heights are no grid of at least 4 by 4 finite numbers, or a range does not rise.
+    """
+
+    x_range: Vector2  # x of the first and last row of nodes [m]
+    y_range: Vector2  # y of the first and last column [m]
+    heights: tuple[tuple[float, ...], ...] = field(repr=False)  # [m], heights[i][j] at x_i and y_j
+
+    def __post_init__(self) -> None:
+        for label, (low, high) in (("x_range", self.x_range), ("y_range", self.y_range)):
+            if not -math.inf < low < high < math.inf:
+                raise InputError(f"{label} of the height field is {low} to {high} m; expected finite numbers that rise")
+        lengths = {len(row) for row in self.heights}
+        if len(lengths) != 1 or min(len(self.heights), *lengths) < bspline.LEAST_NODES:
+            least = bspline.LEAST_NODES
+            raise InputError(f"the height field has {len(self.heights)} rows of {sorted(lengths)} heights; expected "
+                             f"rows of one length, and at least {least} by {least}")  # fmt: skip
+        _finite("heights", *(number for row in self.heights for number in row))
+        object.__setattr__(self, "heights", tuple(tuple(map(float, row)) for row in self.heights))
+
+    @classmethod
+    def sampled(
+        cls, height: Callable[[float, float], float], *, x_range: Vector2, y_range: Vector2, spacing: float
+    ) -> HeightField:
+        """Return the field of a function h(x, y) [m], sampled with nodes at most `spacing` [m] apart."""
+        if not spacing > 0:
+            raise InputError(f"spacing is {spacing} m; expected a positive number")
+        x, y = (
+            np.linspace(low, high, max(bspline.LEAST_NODES, math.ceil((high - low) / spacing - 1e-9) + 1)).tolist()
+            for low, high in (x_range, y_range)
+        )
+        heights = tuple(tuple(float(height(at_x, at_y)) for at_y in y) for at_x in x)
+        return cls(x_range=x_range, y_range=y_range, heights=heights)
+
+    @cached_property
+    def _coefficients(self) -> Array:
+        return bspline.coefficients(np.array(self.heights))
+
+    def height_and_slopes(self, x: SX, y: SX) -> tuple[SX, SX, SX]:
+        """Return h [m] and its slopes [1]."""
+        per_x = (len(self.heights) - 1) / (self.x_range[1] - self.x_range[0])
+        per_y = (len(self.heights[0]) - 1) / (self.y_range[1] - self.y_range[0])
+        u, v = (x - self.x_range[0]) * per_x, (y - self.y_range[0]) * per_y
+        height, along_u, along_v = bspline.evaluate(self._coefficients, u, v)
+        return height, along_u * per_x, along_v * per_y
+
+
+SURFACES: Mapping[str, type[FlatGround | Plane | Stairs | HeightField]] = MappingProxyType(
+    {"flat": FlatGround, "plane": Plane, "stairs": Stairs, "height-field": HeightField}
+)
+"""The surfaces that a scenario's file can name, by their kind."""
+
+
+def frame(surface: Surface, point: SX) -> tuple[SX, SX, SX]:
+    """Return d, n and t of a surface at a point."""
+    if isinstance(surface, Relief):
+        return surface.frame(point)
+    return surface.distance(point), surface.normal(point), surface.tangents(point)
+
+
+def frame_function(surface: Surface) -> cs.Function:
+    """Return p → d, n, t of a surface as a function for numbers."""
+    point = cs.SX.sym("p", 3)
+    parts = [cs.densify(cs.SX(part)) for part in frame(surface, point)]
+    return cs.Function("surface", [point], parts, ["p"], ["d", "n", "t"])
+
+
+def heights_below(surface: Surface, points: Array) -> Array:
+    """Return the surface's z [m] below or above points (3, count): where d = 0, along the vertical.
+
+    One step of Newton's method from each point, which is exact for a surface whose d is linear in z, as all here are.
+    """
+    point = cs.SX.sym("p", 3)
+    distance = cs.SX(surface.distance(point))
+    step = cs.Function("step", [point], [distance / cs.jacobian(distance, point)[2]])
+    return np.asarray(points[2] - np.array(step.map(points.shape[1])(points)).ravel())
+
+
+def _finite(label: str, *numbers: float) -> None:
+    for number in numbers:
+        if not math.isfinite(number):
+            raise InputError(f"{label} of the surface has {number}; expected finite numbers")
+
+
+def _unit(direction: Sequence[float]) -> tuple[float, float]:
+    """Return a horizontal direction with length 1."""
+    length = math.hypot(*direction)
+    if len(direction) != 2 or not 0 < length < math.inf:
+        raise InputError(f"the direction of the surface is {tuple(direction)}; expected two numbers, not both zero")
+    return direction[0] / length, direction[1] / length

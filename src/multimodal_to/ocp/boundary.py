@@ -12,13 +12,13 @@ from multimodal_to.ocp.scenario import Scenario, Start, Terminal
 from multimodal_to.ocp.variables import Bounds
 
 START_ROWS: dict[Start, tuple[KnotRows, ...]] = {
-    Start.STANDING: (constraints.friction_pyramid, constraints.static_equilibrium),
+    Start.STANDING: (constraints.friction_cone, constraints.static_equilibrium),
     Start.HOVER: (
         constraints.unit_quaternion,
         constraints.com_kinematics,
         constraints.contact_kinematics,
         constraints.non_penetration,
-        constraints.friction_pyramid,
+        constraints.friction_cone,
         constraints.static_equilibrium,
         constraints.steady_thrust,
     ),

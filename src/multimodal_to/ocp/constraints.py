@@ -16,6 +16,7 @@ from multimodal_to.adam import centroidal as rigid_body
 from multimodal_to.adam.spatial import SX
 from multimodal_to.models import contact
 from multimodal_to.models.centroidal import momentum_rate, thrust_force
+from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Surface
 from multimodal_to.ocp.integrators import gap, rotation_gap
@@ -29,6 +30,7 @@ class World:
     robot: Robot
     surface: Surface
     friction: float
+    friction_cone: FrictionCone
     standing: Posture  # near home, with the CoM where the motion starts
 
 
@@ -93,10 +95,11 @@ def non_penetration(knot: Knot, world: World) -> Rows:
     )  # fmt: skip
 
 
-def friction_pyramid(knot: Knot, world: World) -> Rows:
-    """|t·f| ≤ μ n·f, which holds n·f ≥ 0 as well (eq. 12, 18, 19)."""
+def friction_cone(knot: Knot, world: World) -> Rows:
+    """|t·f| ≤ μ n·f as the scenario's pyramid or cone, which holds n·f ≥ 0 as well (eq. 12, 18, 19)."""
+    inside = contact.FRICTION[world.friction_cone]
     faces = [
-        contact.friction_pyramid(world.surface, point, force, world.friction)
+        inside(world.surface, point, force, world.friction)
         for point, force in zip(knot.points, knot.forces, strict=True)
     ]
     return Rows(expression=cs.vertcat(*faces), lower=0.0, upper=np.inf, unit="N", scale=50.0)

@@ -18,48 +18,64 @@ Array = NDArray[np.float64]
 
 _CONTACT_TOLERANCE = 1e-6
 """A sole counts as on the ground below this height [m]: more corners than a plane needs make it overdetermined."""
+_TILT_MAX = 0.6
+"""How far the base may turn from home about each axis to stand on a slope [rad]."""
 
 
 def standing_posture(robot: Robot, surface: Surface, com: Vector3) -> Posture:
     """Return the posture nearest to home with every contact point on the ground and the CoM at `com` [m].
 
-    The base keeps its home orientation. Least squares in the joints, solved by IPOPT.
+    The base keeps its home orientation; only where no posture stands so, on a slope that the ankles cannot follow, does
+    it tilt, as little as the joints' way from home makes worth it. Least squares, solved by IPOPT.
 
     Raises:
         ScenarioError: no posture within the joint limits does that.
     """
-    tree, home, limits = robot.kindyn.tree, robot.home, robot.joint_limits
-    position, joints = cs.SX.sym("p", 3), cs.SX.sym("s", len(robot.joint_names))
-    base = Pose(cs.SX(quaternion.rotation_matrix(cs.DM(home.base_quaternion_xyzw))), position)
+    for tilt in (0.0, _TILT_MAX):
+        posture = _nearest_posture(robot, surface, np.array(com), tilt)
+        if posture is not None:
+            return posture
+    raise ScenarioError(
+        f"no posture of {robot.name} within its joint limits stands on the ground with its CoM at {com} m; "
+        "choose another CoM to stand with"
+    )
+
+
+def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float) -> Posture | None:
+    """Return the standing posture with the base turned from home by at most `tilt_max` [rad] about each axis, if any.
+
+    Variables: position of the base, its rotation vector from home in world axes, joints.
+    """
+    tree, home, limits, count = robot.kindyn.tree, robot.home, robot.joint_limits, len(robot.joint_names)
+    position, tilt, joints = cs.SX.sym("p", 3), cs.SX.sym("tilt", 3), cs.SX.sym("s", count)
+    orientation = quaternion.product(quaternion.exp(tilt), cs.DM(home.base_quaternion_xyzw))
+    base = Pose(quaternion.rotation_matrix(orientation), position)
     heights = [
         surface.distance(forward_kinematics(tree, tree.frame(name), base, joints).translation)
         for name in robot.contact_names
     ]
     problem = {
-        "x": cs.vertcat(position, joints),
-        "f": cs.sumsqr(joints - home.joint_positions),
+        "x": cs.vertcat(position, tilt, joints),
+        "f": cs.sumsqr(joints - home.joint_positions) + cs.sumsqr(tilt),
         "g": cs.vertcat(centroidal.com_position(tree, base, joints), *heights),
     }
     options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}}
     solver = cs.nlpsol("standing_posture", "ipopt", problem, options)
-    target = np.array(com)
     result = solver(
-        x0=np.concatenate([home.base_position, home.joint_positions]),
-        lbx=np.concatenate([np.full(3, -np.inf), limits.lower]),
-        ubx=np.concatenate([np.full(3, np.inf), limits.upper]),
-        lbg=np.concatenate([target, np.zeros(len(heights))]),
-        ubg=np.concatenate([target, np.full(len(heights), _CONTACT_TOLERANCE)]),
+        x0=np.concatenate([home.base_position, np.zeros(3), home.joint_positions]),
+        lbx=np.concatenate([np.full(3, -np.inf), np.full(3, -tilt_max), limits.lower]),
+        ubx=np.concatenate([np.full(3, np.inf), np.full(3, tilt_max), limits.upper]),
+        lbg=np.concatenate([com, np.zeros(len(heights))]),
+        ubg=np.concatenate([com, np.full(len(heights), _CONTACT_TOLERANCE)]),
     )
     if not solver.stats()["success"]:
-        raise ScenarioError(
-            f"no posture of {robot.name} within its joint limits stands on the ground with its CoM at {com} m; "
-            "choose another CoM to stand with"
-        )
+        return None
     values = np.array(result["x"]).ravel()
+    turned = cs.Function("turned", [tilt], [orientation])(values[3:6])
     return Posture(
         base_position=values[:3],
-        base_quaternion_xyzw=home.base_quaternion_xyzw,
-        joint_positions=np.clip(values[3:], limits.lower, limits.upper),
+        base_quaternion_xyzw=np.array(turned).ravel(),
+        joint_positions=np.clip(values[6:], limits.lower, limits.upper),
     )
 
 

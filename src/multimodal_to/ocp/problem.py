@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Posture, Robot
+from multimodal_to.models.terrain import Remembered
 from multimodal_to.ocp.boundary import set_boundary
 from multimodal_to.ocp.constraints import World
 from multimodal_to.ocp.guess import standing_posture, straight_line
@@ -94,8 +95,9 @@ def build(robot: Robot, scenario: Scenario) -> Problem:
         robot.group_indices(group)
     layout, bounds, standing = Layout.of(robot), ranges(robot, scenario), _standing(robot, scenario)
     world = World(
-        robot=robot, surface=scenario.surface, friction=scenario.friction or robot.friction, standing=standing
-    )
+        robot=robot, surface=Remembered(scenario.surface), friction=scenario.friction or robot.friction,
+        friction_cone=scenario.friction_cone, standing=standing,
+    )  # fmt: skip
     stages = collect(world, scenario, layout, bounds)
     set_boundary(bounds, robot, scenario, standing)
     nlp = assemble([named.stage for named in stages], layout.size, scenario.knots)

@@ -9,6 +9,7 @@ from enum import Enum
 from types import MappingProxyType
 
 from multimodal_to.errors import ScenarioError
+from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.terrain import FlatGround, Surface
 
 Vector3 = tuple[float, float, float]
@@ -102,6 +103,7 @@ class Scenario:
     weights: Weights
     surface: Surface = field(default_factory=FlatGround)
     friction: float | None = None  # None: the robot's own
+    friction_cone: FrictionCone = FrictionCone.PYRAMID
     slack_max: float = 1.0  # bound of both slacks [N m]
     slack_schedule: tuple[float, ...] = (0.1, 1.0)
     """What both slack weights are multiplied by in one solve after the other, each from the last one's answer."""

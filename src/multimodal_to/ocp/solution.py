@@ -12,7 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.errors import SolverError
+from multimodal_to.models.terrain import SURFACES
 from multimodal_to.ocp.problem import Problem
+from multimodal_to.ocp.scenario import Scenario
+from multimodal_to.ocp.scenario_data import to_json
 from multimodal_to.ocp.solvers import Ipopt, Status
 from multimodal_to.trajectory import Trajectory
 
@@ -148,11 +151,16 @@ def _trajectory(problem: Problem, x: Array) -> Trajectory:
         return difference
 
     return Trajectory(
-        robot=robot.name, scenario=problem.scenario.name, time=time_grid,
+        robot=robot.name, scenario=problem.scenario.name, scenario_json=_kept(problem.scenario), time=time_grid,
         joint_names=robot.joint_names, contact_names=robot.contact_names, jet_names=robot.jet_names,
         com_acceleration=rate("com_velocity"), angular_momentum_rate=rate("angular_momentum"),
         contact_force_rates=rate("contact_forces"), thrust_acceleration=rate("thrust_rate"), **values,
     )  # fmt: skip
+
+
+def _kept(scenario: Scenario) -> str:
+    """Return the scenario as text; a surface of the user's own class cannot be written, and nothing is kept."""
+    return to_json(scenario) if type(scenario.surface) in SURFACES.values() else ""
 
 
 class _Watcher(cs.Callback):  # type: ignore[misc]

@@ -25,7 +25,7 @@ AT_KNOTS: tuple[KnotRows, ...] = (
     constraints.angular_momentum_kinematics,
     constraints.contact_kinematics,
     constraints.non_penetration,
-    constraints.friction_pyramid,
+    constraints.friction_cone,
     constraints.complementarity,
     constraints.contact_reach,
     constraints.jet_reach,

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from multimodal_to.audit import Audit, audit
+from multimodal_to.findings import Finding
 from multimodal_to.models.robot import Robot
 from multimodal_to.plotting.style import (
     COLOURS,
@@ -32,15 +33,14 @@ def plot_margins(
     """Plot the largest of each slack over time [N m], and the worst of each property of the audit over its limit [1].
 
     Both axes are logarithmic and end at 1e-8 and 1e-6; a property that has nothing to show, as a penetration of less
-    than zero, has no bar. A bar that passes 1 fails. `audits` are those to show; by default each run is audited, on
-    flat ground.
+    than zero, has no bar. A bar that passes 1 fails. `audits` are those to show; by default each run is audited.
 
     Raises:
         InputError: the trajectories are for different robots, or too many.
     """
     runs = runs_of(robot, trajectories, labels)
     reports = list(audits) if audits is not None else [audit(run.robot, run.trajectory) for run in runs]
-    count = len(reports[0].findings)
+    count = len(_properties(reports))
     figure = new_figure(runs, "slacks and audit", (8.0, 3.6 + count * (0.19 + 0.06 * (len(runs) - 1))))
     slacks, properties = figure.subplots(2, 1, height_ratios=[2.2, count * 0.19])
     _draw_slacks(slacks, runs)
@@ -68,25 +68,36 @@ def _draw_slacks(axes: Axes, runs: Sequence[Run]) -> None:
 
 
 def _draw_findings(axes: Axes, runs: Sequence[Run], reports: Sequence[Audit]) -> None:
-    thickness = 0.8 / len(runs)
-    findings = reports[0].findings
+    thickness, rows = 0.8 / len(runs), _properties(reports)
+    highest = 1.0
     for number, report in enumerate(reports):
-        shares = np.array([finding.worst / finding.limit for finding in report.findings])
-        places = np.arange(len(findings)) + (number - (len(runs) - 1) / 2.0) * thickness
-        colours = ["0.55" if finding.holds else _FAILED for finding in report.findings]
+        own = report.findings
+        shares = np.array([_share(finding) for finding in own])
+        highest = max(highest, shares.max(initial=0.0))
+        places = [list(rows).index(finding.name) + (number - (len(runs) - 1) / 2.0) * thickness for finding in own]
         axes.barh(
-            places, np.maximum(shares, _FLOOR) - _FLOOR, left=_FLOOR, height=0.9 * thickness, color=colours,
+            places, np.maximum(shares, _FLOOR) - _FLOOR, left=_FLOOR, height=0.9 * thickness,
+            color=["0.55" if finding.holds else _FAILED for finding in own],
             alpha=1.0 - 0.2 * number, hatch="" if number == 0 else "/" * (2 * number), edgecolor="white", linewidth=0.0,
         )  # fmt: skip
-    axes.set_yticks(
-        range(len(findings)), [f"{finding.name} / {finding.limit:.3g} {finding.unit}" for finding in findings],
-        fontsize="x-small",
-    )  # fmt: skip
+    axes.set_yticks(range(len(rows)), list(rows.values()), fontsize="x-small")
     axes.set_xscale("log")
-    highest = max((finding.worst / finding.limit for report in reports for finding in report.findings), default=1.0)
-    axes.set_xlim(_FLOOR, max(10.0, 3.0 * highest))
-    axes.set_ylim(len(findings) - 0.4, -0.6)
+    axes.set_xlim(_FLOOR, 10.0 * highest)
+    axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.axvline(1.0, **LIMIT)
     order = f"; from the top: {', '.join(run.label for run in runs)}" if len(runs) > 1 else ""
     axes.set_xlabel(f"worst over limit; a bar that passes 1 fails{order}", fontsize=SMALL)
     axes.grid(axis="x", alpha=0.3)
+
+
+def _properties(reports: Sequence[Audit]) -> dict[str, str]:
+    """Return the properties that any of the audits has, with what stands beside their bars."""
+    findings = {finding.name: finding for report in reports for finding in report.findings}
+    return {name: f"{name} / {finding.limit:.3g} {finding.unit}" for name, finding in findings.items()}
+
+
+def _share(finding: Finding) -> float:
+    """Return worst over limit; of what cannot be divided, far beyond it or nothing, as it fails or holds."""
+    if finding.limit > 0.0 and np.isfinite(finding.worst):
+        return finding.worst / finding.limit
+    return _FLOOR if finding.holds else 1e3

@@ -11,6 +11,8 @@ import numpy as np
 from multimodal_to.derived import frame_poses, resample
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.terrain import FlatGround, Surface
+from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.replay.bodies import draw_links, draw_visuals, drawn, faded, link_paths, link_poses
 from multimodal_to.replay.effects import draw_com, draw_com_trace, draw_contact_forces, draw_flames
 from multimodal_to.replay.scene import Scene, meshcat
@@ -52,7 +54,7 @@ def draw_motion(
     follow = bool(np.linalg.norm(span) > FOLLOW_FROM)
     low, high = _extent(robot, trajectory, look.visuals, com - com[0] if follow else np.zeros_like(com))
     view = _view(low, high, _HALF_LEFT)
-    draw_stage(scene, view, reach=float(span.max()))
+    draw_stage(scene, view, _surface(trajectory), reach=float(span.max()))
 
     paths = link_paths(robot, look, "robot")
     draw_links(scene, paths, link_poses(robot, trajectory, paths))
@@ -73,7 +75,7 @@ def draw_still(
     """Draw the robot at several times [s] in one scene, with its flames and contact forces, and a label under each.
 
     Where it travels far enough from one to the next, ghosts stand where they were, the earlier the fainter; else they
-    stand side by side, from left to right.
+    stand side by side, from left to right, which ground that is not flat forbids.
 
     Raises:
         InputError: a time is not within the trajectory, or times do not increase.
@@ -82,7 +84,8 @@ def draw_still(
     if instants.size == 0 or (np.diff(instants) <= 0.0).any():
         raise InputError(f"the times of the snapshots are {instants.tolist()}; expected times that increase [s]")
     ghosts = _frozen(trajectory, instants)
-    direction, offsets, apart = _layout(robot, ghosts, look.visuals)
+    surface = _surface(trajectory)
+    direction, offsets, apart = _layout(robot, ghosts, look.visuals, level=isinstance(surface, FlatGround))
     corners = [
         np.array(_extent(robot, ghost, look.visuals, np.zeros((2, 3)))) + offset
         for ghost, offset in zip(ghosts, offsets, strict=True)
@@ -90,7 +93,7 @@ def draw_still(
     low, high = np.min([pair[0] for pair in corners], axis=0), np.max([pair[1] for pair in corners], axis=0)
     view = _view(low, high, direction, aspect=aspect, zoom=_STILL_ZOOM)
     scene = Scene(visualizer=visualizer, time=np.zeros(1))
-    draw_stage(scene, view)
+    draw_stage(scene, view, surface)
     bodies = {visual: drawn(visual) for visual in look.visuals}
     opacities = np.ones(len(ghosts)) if apart else np.linspace(_FAINTEST, 1.0, len(ghosts))
     for index, (ghost, offset, opacity) in enumerate(zip(ghosts, offsets, opacities.tolist(), strict=True)):
@@ -110,6 +113,12 @@ def draw_still(
     return Picture(home=-view.middle, way=np.zeros((0, 3)), follow=False, still=True, labels=labels)
 
 
+def _surface(trajectory: Trajectory) -> Surface:
+    """Return the ground of the scenario that the trajectory keeps; flat where it keeps none."""
+    scenario = stored(trajectory)
+    return FlatGround() if scenario is None else scenario.surface
+
+
 def _frozen(trajectory: Trajectory, instants: Array) -> list[Trajectory]:
     """Return for each instant [s] a trajectory of two knots that both show it."""
     times = np.union1d(instants, trajectory.time[[0, -1]])  # a trajectory has at least two knots
@@ -122,14 +131,19 @@ def _frozen(trajectory: Trajectory, instants: Array) -> list[Trajectory]:
     ]
 
 
-def _layout(robot: Robot, ghosts: list[Trajectory], visuals: tuple[Visual, ...]) -> tuple[Array, Array, bool]:
+def _layout(
+    robot: Robot, ghosts: list[Trajectory], visuals: tuple[Visual, ...], *, level: bool
+) -> tuple[Array, Array, bool]:
     """Return the camera's direction, how far each ghost is moved aside (ghosts, 3), and whether they were moved."""
     low, high = _extent(robot, ghosts[0], visuals, np.zeros((2, 3)))
     width = float(np.linalg.norm((high - low)[:2])) / math.sqrt(2.0)
     places = np.array([ghost.com_position[:, 0] * [1.0, 1.0, 0.0] for ghost in ghosts])
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    if len(ghosts) > 1 and steps.min() > 0.5 * width:
-        travel = (places[-1] - places[0]) / np.linalg.norm(places[-1] - places[0])
+    if not level and (len(ghosts) < 2 or not steps.any()):
+        return _HALF_LEFT, np.zeros((len(ghosts), 3)), True
+    if len(ghosts) > 1 and (steps.min() > 0.5 * width or not level):
+        farthest = places[np.linalg.norm(places - places[0], axis=1).argmax()] - places[0]
+        travel = farthest / np.linalg.norm(farthest)
         side = np.array([travel[1], -travel[0], _FROM_THE_SIDE])  # from there the motion goes from left to right
         return side, np.zeros((len(ghosts), 3)), False
     direction = np.array([*_HALF_LEFT[:2], _FROM_THE_SIDE])

@@ -8,10 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from multimodal_to.models.terrain import FlatGround, Surface
 from multimodal_to.replay.scene import Y_TO_Z, Command, Scene, shapes, translation
+from multimodal_to.terrain_mesh import patch
 from multimodal_to.trajectory import Array
 
 _GRID_SPACING, _GRID_CELLS = 0.25, 16  # of the ground around the motion, in cells from its middle [m]
+_TERRAIN_AROUND = 2.0  # how far terrain is drawn beyond what is seen at once [m]
+_GROUND_COLOUR, _LINE_COLOUR = 0xB9C1CA, 0x7F8B98
 _FIELD = math.tan(math.radians(37.5))  # half the height that the viewer's camera sees, per metre of distance, zoom 1
 _MARGIN = 1.1  # of what is seen over what must be
 
@@ -34,7 +38,7 @@ class View:
         return _MARGIN * self.zoom * max(self.height, self.width / self.aspect) / (2.0 * _FIELD) + self.depth / 2.0
 
 
-def draw_stage(scene: Scene, view: View, reach: float = 0.0) -> None:
+def draw_stage(scene: Scene, view: View, surface: Surface, reach: float = 0.0) -> None:
     """Draw background, ground, lights and camera; the view's middle becomes the origin that the camera turns about.
 
     The ground goes on for `reach` [m] beyond what is seen at once, for a camera that follows.
@@ -45,7 +49,7 @@ def draw_stage(scene: Scene, view: View, reach: float = 0.0) -> None:
     visualizer["/Grid"].set_property("visible", False)
     visualizer["/Axes"].set_property("visible", False)
     visualizer.set_property("position", (-view.middle).tolist())
-    _draw_ground(scene, view, reach)
+    _draw_ground(scene, view, surface, reach)
     _draw_lights(scene, view)
     x, y, z = view.distance * view.direction / np.linalg.norm(view.direction)
     camera = visualizer["/Cameras/default/rotated/<object>"]
@@ -53,14 +57,22 @@ def draw_stage(scene: Scene, view: View, reach: float = 0.0) -> None:
     camera.set_property("zoom", view.zoom)
 
 
-def _draw_ground(scene: Scene, view: View, reach: float) -> None:
-    place = np.array([*np.round(view.middle[:2] / _GRID_SPACING) * _GRID_SPACING, 0.0])
+def _draw_ground(scene: Scene, view: View, surface: Surface, reach: float) -> None:
+    """Draw the ground: a disc with a grid where it is flat, else a patch of it with lines that show its shape."""
+    if not isinstance(surface, FlatGround):
+        terrain = patch(surface, view.middle[:2], view.width / 2 + reach + _TERRAIN_AROUND)
+        mesh = shapes.TriangularMeshGeometry(terrain.vertices, terrain.faces)
+        grey = shapes.MeshLambertMaterial(color=_GROUND_COLOUR)
+        scene.add("ground/terrain", mesh, grey, translation([0.0, 0.0, -0.002]), shadow=False)
+        lines = shapes.LineBasicMaterial(color=_LINE_COLOUR, opacity=0.7)
+        scene.add("ground/lines", shapes.LineSegments(shapes.PointsGeometry(terrain.lines), lines), None, np.eye(4))
+        return
+    place = np.array([*np.round(view.middle[:2] / _GRID_SPACING) * _GRID_SPACING, surface.height])
     cells = _GRID_CELLS + math.ceil((view.width / 2 + reach) / _GRID_SPACING)
-    disc, grey = shapes.Cylinder(0.02, 1.6 * cells * _GRID_SPACING), shapes.MeshLambertMaterial(color=0xB9C1CA)
-    scene.add("ground/disc", disc, grey, translation([place[0], place[1], -0.012]) @ Y_TO_Z, shadow=False)
-    faint = shapes.LineBasicMaterial(color=0x7F8B98, opacity=0.35)
-    grid = shapes.LineSegments(shapes.PointsGeometry(_grid(cells)), faint)
-    scene.add("ground/grid", grid, None, translation(place))
+    disc, grey = shapes.Cylinder(0.02, 1.6 * cells * _GRID_SPACING), shapes.MeshLambertMaterial(color=_GROUND_COLOUR)
+    scene.add("ground/disc", disc, grey, translation(place - [0.0, 0.0, 0.012]) @ Y_TO_Z, shadow=False)
+    faint = shapes.LineBasicMaterial(color=_LINE_COLOUR, opacity=0.35)
+    scene.add("ground/grid", shapes.LineSegments(shapes.PointsGeometry(_grid(cells)), faint), None, translation(place))
 
 
 def _draw_lights(scene: Scene, view: View) -> None:
