@@ -124,6 +124,14 @@ def test_all_figures_of_two_files_are_plotted_under_names_of_their_own(file, tmp
     assert names == ["com", "contacts", "forces", "joints", "margins", "momentum", "torques"]
 
 
+def test_report_and_export_read_a_saved_file(file, tmp_path):
+    assert run("report", file, "--output", tmp_path / "report.html", "--no-meshes").returncode == 0
+    assert (tmp_path / "report.html").stat().st_size > 1_000_000
+    for kind, name in (("csv", "t.csv"), ("mat", "t.mat"), ("mujoco", "m.npz"), ("pinocchio", "p.npz")):
+        assert run("export", file, "--to", kind, "--output", tmp_path / name).returncode == 0
+        assert (tmp_path / name).stat().st_size > 10_000
+
+
 def test_audit_says_what_fails_and_leaves_with_one(file):
     result = run("audit", file)  # a drawn motion, not a true one
     assert result.returncode == 1
@@ -169,6 +177,8 @@ def test_bare_arrays_are_audited_once_their_robot_is_named(file, tmp_path):
         (("plot", "none.npz", "--figure", "force"), "unknown figure 'force'; did you mean 'forces'?"),
         (("replay", "none.npz", "--gif", "film.mp4"), "no trajectory file"),
         (("replay", "none.npz"), "no trajectory file 'none.npz'"),
+        (("report", "none.npz"), "no trajectory file 'none.npz'"),
+        (("export", "none.npz", "--to", "matlab"), "unknown export 'matlab'; did you mean 'mat'?"),
         (("audit", "none.npz"), "no trajectory file 'none.npz'"),
         (("robot", "info", "none.urdf"), "unknown robot 'none.urdf'"),
         (("robot", "info", __file__), "is not valid XML"),

@@ -27,6 +27,7 @@ from rich.text import Text
 from multimodal_to.adam.inspection import describe
 from multimodal_to.audit import Audit, audit
 from multimodal_to.errors import InputError, MultimodalError, OutputError, ScenarioError, unknown
+from multimodal_to.export import EXPORTS
 from multimodal_to.importing import import_arrays
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.ocp import Ipopt, Iterate, Solution, build
@@ -260,6 +261,49 @@ def replay(
             time.sleep(1.0)
     except KeyboardInterrupt:
         _out.print()
+
+
+@app.command("report")
+def report_file(
+    file: File,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write. [FILE.html]")] = None,
+    meshes: Annotated[bool, typer.Option(help="Draw meshes where the robot has them.")] = True,
+    robot: RobotOption = "",
+) -> None:
+    """Write one page with replay, figures, audit and scenario of a trajectory; it opens from disk and prints.
+
+    Example: multimodal-to report results/take-off/trajectory.npz --output take-off.html
+    """
+    the_robot, trajectory = _load(file, robot)
+    target = output or file.with_suffix(".html")
+    if target.suffix.lower() != ".html":
+        raise OutputError(f"'{target}' is no .html")
+    _writable(target.parent)
+    from multimodal_to.report import write_report
+
+    _out.print(f"wrote {write_report(the_robot, trajectory, target, meshes=meshes)}", soft_wrap=True)
+
+
+@app.command("export")
+def export_file(
+    file: File,
+    to: Annotated[str, typer.Option("--to", help="csv, mat, mujoco or pinocchio.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write. [FILE.csv and so on]")] = None,
+    robot: RobotOption = "",
+) -> None:
+    """Write a trajectory for another program, with names, units and conventions.
+
+    Example: multimodal-to export results/take-off/trajectory.npz --to mujoco --output take-off-mujoco.npz
+    """
+    if to not in EXPORTS:
+        raise InputError(unknown("export", to, EXPORTS))
+    the_robot, trajectory = _load(file, robot)
+    suffix, write = EXPORTS[to]
+    target = output or (file.with_stem(f"{file.stem}-{to}") if suffix == ".npz" else file.with_suffix(suffix))
+    if target.suffix.lower() != suffix:
+        raise OutputError(f"'{target}' is no {suffix}")
+    _writable(target.parent)
+    _out.print(f"wrote {write(the_robot, trajectory, target)}", soft_wrap=True)
 
 
 @robot_app.command("info")
