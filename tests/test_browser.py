@@ -27,6 +27,7 @@ def shown(ironcub, trajectory, tmp_path_factory):
     if find_browser() is None:
         pytest.skip("no Chromium or Chrome is installed")
     page = replay.write_html(ironcub, trajectory, tmp_path_factory.mktemp("page") / "replay.html")
+    assert page.stat().st_size < 15e6
     with open_browser((500, 400)) as browser:
         browser.open(page)
         yield browser

@@ -31,7 +31,9 @@ _FAINTEST = 0.25  # opacity of a flame almost without thrust, as a share of that
 _COM_COLOUR = 0x2B6CE0
 
 
-def draw_flames(scene: Scene, robot: Robot, thrust: Array, paths: Mapping[str, str], opacity: float = 1.0) -> None:
+def draw_flames(
+    scene: Scene, robot: Robot, thrust: Array, paths: Mapping[str, str], *, opacity: float = 1.0, steady: bool = False
+) -> None:
     """Draw at each jet a flame along +z of its frame, where the exhaust leaves.
 
     Its length is `FLAME_LENGTH` T / T_max of the strongest jet; its opacity grows linearly with T / T_max of its own.
@@ -42,6 +44,7 @@ def draw_flames(scene: Scene, robot: Robot, thrust: Array, paths: Mapping[str, s
         thrust: T of each jet at every knot [N], (jets, knots + 1).
         paths: where the links are.
         opacity: of the robot in all.
+        steady: keep the opacity of full thrust, for a viewer that cannot move what belongs to a material.
     """
     strongest = max((jet.thrust_max for jet in robot.jets), default=1.0)
     for jet, row in zip(robot.jets, np.maximum(thrust, 0.0), strict=True):
@@ -49,10 +52,13 @@ def draw_flames(scene: Scene, robot: Robot, thrust: Array, paths: Mapping[str, s
         glow = opacity * (_FAINTEST + (1.0 - _FAINTEST) * np.minimum(row / jet.thrust_max, 1.0))
         for name, colour, width, length, brightest in _LAYERS:
             material = shapes.MeshBasicMaterial(
-                color=colour, opacity=float(brightest * glow[0]), transparent=True, depthWrite=False
+                color=colour,
+                opacity=float(brightest * (opacity if steady else glow[0])),
+                transparent=True,
+                depthWrite=False,
             )
             scene.add(f"{path}/{name}", _plume(width * radius, length), material, np.eye(4), shadow=False)
-            if np.ptp(glow) > 0.0:
+            if np.ptp(glow) > 0.0 and not steady:
                 scene.move(f"{path}/{name}/<object>", "material.opacity", brightest * glow)
         _stretch(scene, path, FLAME_LENGTH * row / strongest)
 

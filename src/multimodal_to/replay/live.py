@@ -17,5 +17,5 @@ def show(robot: Robot, trajectory: Trajectory, *, meshes: bool = True) -> meshca
     look = appearance(robot.urdf, meshes=meshes)
     with redirect_stdout(io.StringIO()):  # meshcat prints the address
         visualizer = meshcat.Visualizer()
-    draw_motion(visualizer, robot, trajectory, look, follow_here=True)
+    draw_motion(visualizer, robot, trajectory, look, live=True)
     return visualizer

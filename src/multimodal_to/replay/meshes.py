@@ -51,12 +51,11 @@ def load_parts(uri: str, urdf: Path, scale: Array) -> list[Part]:
         if stream.read(len(_POINTER)) == _POINTER:
             raise _UnusableError("a git-LFS pointer; `git lfs pull` fetches the mesh")
     try:
-        scene = trimesh.load_scene(file)
-        meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
+        meshes = [mesh for mesh in trimesh.load_scene(file).dump() if isinstance(mesh, trimesh.Trimesh)]
     except Exception as error:  # readers of a dozen formats raise whatever they run into
         raise _UnusableError(f"no mesh that can be read: {error}") from error
     if not meshes:
-        raise _UnusableError("holds no triangles")
+        raise _UnusableError("no triangles that can be read")
     return [Part(vertices=mesh.vertices * scale, faces=np.asarray(mesh.faces), rgba=_colour(mesh)) for mesh in meshes]
 
 

@@ -25,7 +25,9 @@ FOLLOW_FROM = 0.6
 
 _HALF_LEFT = np.array([-0.72, -0.66, 0.22])  # where the camera is, seen from a robot that faces −x
 _FROM_THE_SIDE = 0.14  # how high the camera of a still scene is, per metre of distance
+_BAR = 0.12  # room below the robot for the buttons of the page, per metre of its height
 _STILL_ZOOM = 4.0  # from farther off, so that ghosts look alike
+_CLOCK = 0.01  # what the clock of a page shows [s]: a time so near to start or end means it
 _GAP = 0.25  # between the ghosts of a motion that stays in its place, per width of the robot
 _FAINTEST = 0.45  # opacity of the first of the ghosts that may overlap
 
@@ -42,28 +44,30 @@ class Picture:
 
 
 def draw_motion(
-    visualizer: meshcat.Visualizer, robot: Robot, trajectory: Trajectory, look: Appearance, *, follow_here: bool = False
+    visualizer: meshcat.Visualizer, robot: Robot, trajectory: Trajectory, look: Appearance, *, live: bool = False
 ) -> Picture:
     """Draw stage, robot, flames, contact forces and CoM, and set the animation that moves them, at true speed.
 
-    With `follow_here` the animation also moves the scene so that the camera follows; else that is left to the page.
+    In meshcat's own `live` page the animation also moves the scene so that the camera follows, which ours does itself,
+    and flames keep one brightness, since it knows the materials too late.
     """
     scene = Scene(visualizer=visualizer, time=trajectory.time - trajectory.time[0])
     com = trajectory.com_position.T * [1.0, 1.0, 0.0]
     span = np.ptp(com, axis=0)
     follow = bool(np.linalg.norm(span) > FOLLOW_FROM)
     low, high = _extent(robot, trajectory, look.visuals, com - com[0] if follow else np.zeros_like(com))
+    low[2] = min(low[2], 0.0) - _BAR * (high[2] - low[2])
     view = _view(low, high, _HALF_LEFT)
     draw_stage(scene, view, _surface(trajectory), reach=float(span.max()))
 
     paths = link_paths(robot, look, "robot")
     draw_links(scene, paths, link_poses(robot, trajectory, paths))
     draw_visuals(scene, paths, {visual: drawn(visual) for visual in look.visuals})
-    draw_flames(scene, robot, trajectory.thrust, paths)
+    draw_flames(scene, robot, trajectory.thrust, paths, steady=live)
     draw_contact_forces(scene, robot, trajectory)
     draw_com(scene, trajectory)
     way = -view.middle - (com - com[0])
-    if follow and follow_here:
+    if follow and live:
         scene.move("", "position", way)
     visualizer.set_animation(scene.animation, play=True, repetitions=math.inf)
     return Picture(home=-view.middle, way=way, follow=follow, still=False)
@@ -81,6 +85,8 @@ def draw_still(
         InputError: a time is not within the trajectory, or times do not increase.
     """
     instants = np.asarray(times, dtype=float)
+    ends = np.clip(instants, trajectory.time[0], trajectory.time[-1])
+    instants = np.where(np.abs(instants - ends) < _CLOCK, ends, instants)
     if instants.size == 0 or (np.diff(instants) <= 0.0).any():
         raise InputError(f"the times of the snapshots are {instants.tolist()}; expected times that increase [s]")
     ghosts = _frozen(trajectory, instants)
@@ -100,7 +106,7 @@ def draw_still(
         paths = link_paths(robot, look, f"ghost_{index}/robot")
         draw_links(scene, paths, link_poses(robot, ghost, paths))
         draw_visuals(scene, paths, bodies if opacity == 1.0 else faded(bodies, opacity))
-        draw_flames(scene, robot, ghost.thrust, paths, opacity)
+        draw_flames(scene, robot, ghost.thrust, paths, opacity=opacity)
         draw_contact_forces(scene, robot, ghost, f"ghost_{index}/contact_forces")
         visualizer[f"ghost_{index}"].set_property("position", offset.tolist())
     if not apart:

@@ -20,11 +20,9 @@ from multimodal_to.trajectory import Array, Trajectory
 from multimodal_to.writing import write_text
 
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
-_LEGEND = (
-    ("#f58a24", "flame: thrust of a jet"),
-    ("#1fa34a", "arrow: contact force"),
-    ("#2b6ce0", "sphere and line: centre of mass"),
-)
+_FLAME = ("#f58a24", "flame: thrust of a jet")
+_ARROW = ("#1fa34a", "arrow: contact force")
+_COM = ("#2b6ce0", "sphere and line: centre of mass")
 _FLIGHT = ("#d62728", "bar above the time: flight")
 
 
@@ -66,12 +64,13 @@ def _page(trajectory: Trajectory, content: str) -> str:
 
 
 def _player(trajectory: Trajectory, recorder: Recorder, picture: Picture, attribution: str) -> str:
-    phases = [] if picture.still else flight_phases(trajectory)
-    legend = (*_LEGEND, _FLIGHT) if phases else _LEGEND
+    phases = [] if picture.still or not trajectory.contact_names else flight_phases(trajectory)
+    shown = {_FLAME: trajectory.jet_names, _ARROW: trajectory.contact_names, _COM: not picture.still, _FLIGHT: phases}
+    keys = [f'<div><span class="key" style="background: {colour}"></span>{text}</div>'
+            for (colour, text), some in shown.items() if some]  # fmt: skip
     return _template("player.html").substitute(
         title=_title(trajectory),
-        legend="".join(f'<div><span class="key" style="background: {colour}"></span>{text}</div>'
-                       for colour, text in legend if trajectory.jet_names or not text.startswith("flame")),
+        legend="".join(keys),
         credit=f'<div class="panel credit">{html.escape(attribution)}</div>' if attribution else "",
         bands="".join(_band(trajectory, *phase) for phase in phases),
         duration=f"{trajectory.duration:.6f}",

@@ -125,4 +125,5 @@ def _warn(problems: Mapping[str, str]) -> None:
     if problems:
         named = "; ".join(f"'{uri}': {problem}" for uri, problem in list(problems.items())[:_NAMED])
         more = f"; and {len(problems) - _NAMED} more" if len(problems) > _NAMED else ""
-        warnings.warn(f"{len(problems)} meshes are not drawn: {named}{more}", MeshWarning, stacklevel=2)
+        count = "1 mesh is" if len(problems) == 1 else f"{len(problems)} meshes are"
+        warnings.warn(f"{count} not drawn: {named}{more}", MeshWarning, stacklevel=2)
