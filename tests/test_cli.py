@@ -116,6 +116,23 @@ def test_plot_and_replay_read_a_saved_file(file, tmp_path):
     assert (tmp_path / "page.html").stat().st_size > 800_000  # the viewer is inside
 
 
+def test_all_figures_of_two_files_are_plotted_under_names_of_their_own(file, tmp_path):
+    other = tmp_path / "again.npz"
+    other.write_bytes(file.read_bytes())
+    result = run("plot", file, other, "--figure", "all", "--output", tmp_path / "both.png")
+    assert result.returncode == 0
+    names = sorted(path.stem.removeprefix("both-") for path in tmp_path.glob("*.png"))
+    assert names == ["com", "contacts", "forces", "joints", "margins", "momentum", "torques"]
+
+
+def test_report_and_export_read_a_saved_file(file, tmp_path):
+    assert run("report", file, "--output", tmp_path / "report.html", "--no-meshes").returncode == 0
+    assert (tmp_path / "report.html").stat().st_size > 1_000_000
+    for kind, name in (("csv", "t.csv"), ("mat", "t.mat"), ("mujoco", "m.npz"), ("pinocchio", "p.npz")):
+        assert run("export", file, "--to", kind, "--output", tmp_path / name).returncode == 0
+        assert (tmp_path / name).stat().st_size > 10_000
+
+
 def test_audit_says_what_fails_and_leaves_with_one(file):
     result = run("audit", file)  # a drawn motion, not a true one
     assert result.returncode == 1
@@ -158,7 +175,11 @@ def test_bare_arrays_are_audited_once_their_robot_is_named(file, tmp_path):
         (("solve", "take-off", "--robot", "ironcup"), "unknown robot 'ironcup'; did you mean 'ironcub'?"),
         (("solve", "take-off", "--max-iterations", "0"), "max_iterations is 0; expected a positive number"),
         (("plot", "none.npz"), "no trajectory file 'none.npz'"),
+        (("plot", "none.npz", "--figure", "force"), "unknown figure 'force'; did you mean 'forces'?"),
+        (("replay", "none.npz", "--gif", "film.mp4"), "no trajectory file"),
         (("replay", "none.npz"), "no trajectory file 'none.npz'"),
+        (("report", "none.npz"), "no trajectory file 'none.npz'"),
+        (("export", "none.npz", "--to", "matlab"), "unknown export 'matlab'; did you mean 'mat'?"),
         (("audit", "none.npz"), "no trajectory file 'none.npz'"),
         (("robot", "info", "none.urdf"), "unknown robot 'none.urdf'"),
         (("robot", "info", __file__), "is not valid XML"),

@@ -12,6 +12,7 @@ import multimodal_to
 ROOT = Path(multimodal_to.__file__).parent
 FLOORS = [
     {"errors"},
+    {"writing"},
     {"trajectory"},
     {"adam"},
     {"models"},
@@ -20,7 +21,9 @@ FLOORS = [
     {"scenario_files", "derived", "terrain_mesh"},
     {"findings"},
     {"audit_task", "audit_thrust"},
-    {"audit", "replay", "plotting", "importing"},
+    {"audit", "importing"},
+    {"replay", "plotting"},
+    {"report", "export"},
     {"cli", "__init__"},
     {"__main__"},
 ]

@@ -10,7 +10,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Rectangle
 
 from multimodal_to import derived, plotting
+from multimodal_to.errors import InputError, OutputError
 from multimodal_to.models.robot import load_robot
+from multimodal_to.plotting import style
 from synthetic import DURATION, LIFT_OFF, take_off
 
 
@@ -81,7 +83,7 @@ def test_a_force_just_below_the_threshold_counts_as_flight(robot, trajectory):
 
 def test_limits_and_weight_are_dashed_lines(figure, robot):
     dashed = [
-        {float(line.get_ydata()[0]) for line in axes.lines if line.get_color() == plotting._LIMIT["color"]}
+        {float(line.get_ydata()[0]) for line in axes.lines if line.get_color() == style.LIMIT["color"]}
         for axes in figure.axes
     ]
     assert dashed[:2] == [{0.0, 100.0}, {jet.thrust_max for jet in robot.jets}]
@@ -132,3 +134,116 @@ def test_the_figure_belongs_to_no_window_and_is_saved_by_its_caller(figure):
     stream = io.BytesIO()
     figure.savefig(stream, format="png")
     assert stream.getvalue().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", sorted(plotting.FIGURES))
+def test_every_figure_has_units_and_no_legend_over_its_data(name, robot, trajectory):
+    figure = plotting.plot(name, robot, trajectory)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    titles = [axes.get_ylabel() for axes in figure.axes] + [text.get_text() for text in all_texts(figure)]
+    assert any("[" in title for title in titles)
+    for axes in figure.axes:
+        if (legend := axes.get_legend()) is not None:
+            box, data = legend.get_window_extent(renderer), axes.get_window_extent(renderer)
+            assert box.y0 >= data.y1 - 1.0 or box.y1 <= data.y0 + 1.0
+
+
+def all_texts(figure) -> list:
+    return [*figure.texts, *(text for part in figure.subfigs for text in part.texts), *(
+        part._supylabel for part in (figure, *figure.subfigs) if part._supylabel is not None
+    )]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", sorted(plotting.FIGURES))
+def test_two_runs_share_a_figure_and_a_legend_tells_them_apart(name, robot, trajectory):
+    later = replace(trajectory, scenario="other", com_position=trajectory.com_position + 0.1)
+    figure = plotting.plot(name, robot, trajectory, later, labels=["first", "second"])
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["first", "second"]
+    styles = {line.get_linestyle() for line in legend.get_lines()}
+    assert len(styles) == 2
+
+
+def test_the_com_figure_shows_all_six_components(robot, trajectory):
+    figure = plotting.plot_com(robot, trajectory)
+    expected = [row for pair in zip(trajectory.com_position, trajectory.com_velocity, strict=True) for row in pair]
+    for axes, row in zip(figure.axes, expected, strict=True):
+        np.testing.assert_array_equal(axes.lines[0].get_ydata(), row)
+
+
+def test_joint_panels_hold_the_whole_range_of_each_joint(robot, trajectory):
+    figure = plotting.plot_joints(robot, trajectory)
+    panels = {axes.get_title(): axes for axes in figure.axes}
+    for index, name in enumerate(robot.joint_names):
+        axes = panels[name]
+        np.testing.assert_array_equal(axes.lines[0].get_ydata(), trajectory.joint_positions[index])
+        assert axes.get_ylim()[0] <= robot.joint_limits.lower[index]
+        assert axes.get_ylim()[1] >= robot.joint_limits.upper[index]
+
+
+def test_torques_are_those_of_statics_when_the_robot_stands_still(robot, trajectory):
+    count = trajectory.time.size
+    still = {name: np.repeat(getattr(trajectory, name)[:, :1], count, axis=1) for name in trajectory_names()}
+    standing = replace(trajectory, **still)
+    torques = derived.generalised_forces(robot, standing)
+    base = derived.base_poses(standing)[0]
+    gravity = np.array(robot.kindyn.gravity_term_fun()(base, standing.joint_positions[:, 0])).ravel()
+    pushed = np.zeros(len(gravity))
+    for name, force in zip(robot.contact_names, standing.per_contact("contact_forces")[:, :, 0], strict=True):
+        jacobian = np.array(robot.kindyn.jacobian_fun(name)(base, standing.joint_positions[:, 0]))
+        pushed += jacobian[:3].T @ force
+    np.testing.assert_allclose(torques[:, 5], gravity - pushed, atol=1e-9)
+    (knee,) = (axes for axes in plotting.plot_torques(robot, standing).axes if axes.get_title().startswith("l_knee"))
+    drawn = knee.lines[0].get_ydata()
+    assert np.isnan(drawn[0])
+    np.testing.assert_array_equal(drawn[1:], torques[6 + robot.joint_names.index("l_knee"), 1:])
+
+
+def trajectory_names() -> tuple[str, ...]:
+    return "base_position", "base_quaternion_xyzw", "joint_positions", "contact_forces", "thrust", "com_position"
+
+
+def test_the_contact_timeline_ends_where_the_load_ends(robot, trajectory):
+    timeline = plotting.plot_contacts(robot, trajectory).axes[0]
+    assert [label.get_text() for label in timeline.get_yticklabels()] == list(robot.contact_names)
+    assert len(timeline.collections) == len(robot.contacts)
+    for bars in timeline.collections:
+        (bar,) = bars.get_paths()
+        assert bar.vertices[:, 0].min() == 0.0
+        assert bar.vertices[:, 0].max() == pytest.approx(LIFT_OFF - DURATION / 20)  # the last knot above the threshold
+
+
+def test_margins_colour_what_fails(robot, trajectory):
+    from multimodal_to.audit import audit
+
+    report = audit(robot, trajectory)
+    bars = plotting.plot_margins(robot, trajectory, audits=[report]).axes[1].patches
+    failed = [finding.name for finding in report.findings if not finding.holds]
+    red = [
+        finding.name
+        for finding, bar in zip(report.findings, bars, strict=True)
+        if bar.get_facecolor()[0] > 2 * bar.get_facecolor()[1]
+    ]
+    assert red == failed
+    assert failed
+
+
+@pytest.mark.parametrize("suffix", style.SUFFIXES)
+def test_a_figure_is_saved_by_its_suffix_and_whole(figure, tmp_path, suffix):
+    path = plotting.save(figure, tmp_path / f"figure{suffix}")
+    assert path.stat().st_size > 5000
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_bad_figures_end_in_one_sentence(figure, robot, trajectory, tmp_path):
+    with pytest.raises(OutputError, match=r"is no \.png, \.svg or \.pdf"):
+        plotting.save(figure, tmp_path / "figure.bmp")
+    with pytest.raises(InputError, match="unknown figure 'force'; did you mean 'forces'"):
+        plotting.plot("force", robot, trajectory)
+    with pytest.raises(InputError, match="shows 1 to 4"):
+        plotting.plot_com(robot)
+    with pytest.raises(InputError, match="2 labels"):
+        plotting.plot_com(robot, trajectory, labels=["one", "two"])
+    assert list(tmp_path.iterdir()) == []

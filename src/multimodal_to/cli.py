@@ -10,6 +10,7 @@ import math
 import signal
 import sys
 import time
+import warnings
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -25,7 +26,8 @@ from rich.text import Text
 
 from multimodal_to.adam.inspection import describe
 from multimodal_to.audit import Audit, audit
-from multimodal_to.errors import MultimodalError, OutputError, ScenarioError
+from multimodal_to.errors import InputError, MultimodalError, OutputError, ScenarioError, unknown
+from multimodal_to.export import EXPORTS
 from multimodal_to.importing import import_arrays
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.ocp import Ipopt, Iterate, Solution, build
@@ -59,6 +61,7 @@ RobotOption = Annotated[str, typer.Option("--robot", help="Bundled robot by name
 
 def main() -> None:
     """Run the command line; errors of the library end in one sentence and exit status 2."""
+    warnings.showwarning = _show_warning  # type: ignore[assignment]
     try:
         app()
     except MultimodalError as error:
@@ -152,11 +155,11 @@ def solve(
     report = audit(the_robot, solution.trajectory, scenario)
     _summarise(console, solution, report)
 
-    from multimodal_to.plotting import plot_forces  # viewers take a second to import, other commands need none
+    from multimodal_to.plotting import plot_forces, save  # viewers take a second to import, other commands need none
     from multimodal_to.replay import write_html
 
-    written = [solution.trajectory.save(folder / "trajectory.npz"), folder / "forces.png"]
-    plot_forces(the_robot, solution.trajectory).savefig(written[1], dpi=150)
+    written = [solution.trajectory.save(folder / "trajectory.npz")]
+    written.append(save(plot_forces(the_robot, solution.trajectory), folder / "forces.png"))
     written.append(write_html(the_robot, solution.trajectory, folder / "replay.html"))
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)
@@ -175,46 +178,84 @@ def _load(file: Path, robot: str) -> tuple[Robot, Trajectory]:
 
 @app.command()
 def plot(
-    file: File,
+    files: Annotated[list[Path], typer.Argument(help="Trajectory files; several are drawn in one figure.")],
+    figure: Annotated[
+        str, typer.Option(help="forces, com, momentum, joints, torques, contacts, margins, or all of them.")
+    ] = "forces",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Picture: .png, .svg or .pdf. [FILE with .png]")
+        Path | None,
+        typer.Option("--output", "-o", help="Picture: .png, .svg or .pdf; of all, the start of the names. [FILE.png]"),
     ] = None,
     robot: RobotOption = "",
 ) -> None:
-    """Plot throttle, thrust and contact force of a trajectory.
+    """Plot a trajectory, or several to compare, with limits dashed and flight in red.
 
-    Example: multimodal-to plot results/take-off/trajectory.npz --output forces.svg
+    Example: multimodal-to plot results/take-off/trajectory.npz --figure com --output com.svg
     """
-    the_robot, trajectory = _load(file, robot)
-    target = output or file.with_suffix(".png")
-    if target.suffix not in (".png", ".svg", ".pdf"):
-        raise OutputError(f"'{target}' is no .png, .svg or .pdf")
-    _writable(target.parent)
-    from multimodal_to.plotting import plot_forces
+    from multimodal_to.plotting import FIGURES, SUFFIXES, save
+    from multimodal_to.plotting import plot as draw
 
-    plot_forces(the_robot, trajectory).savefig(target, dpi=150)
-    _out.print(f"wrote {target}", soft_wrap=True)
+    target = output or files[0].with_suffix(".png")
+    if target.suffix.lower() not in SUFFIXES:
+        raise OutputError(f"'{target}' is no .png, .svg or .pdf")
+    if figure not in (*FIGURES, "all"):
+        raise InputError(unknown("figure", figure, (*FIGURES, "all")))
+    loaded = [_load(file, robot) for file in files]
+    the_robot = load_robot(robot or loaded[0][1].robot)
+    trajectories = [trajectory for _, trajectory in loaded]
+    _writable(target.parent)
+    for name in FIGURES if figure == "all" else (figure,):
+        path = target.with_stem(f"{target.stem}-{name}") if figure == "all" else target
+        drawn = draw(name, the_robot, *trajectories, labels=_labels(files, trajectories))
+        _out.print(f"wrote {save(drawn, path)}", soft_wrap=True)
+
+
+def _labels(files: list[Path], trajectories: list[Trajectory]) -> list[str]:
+    """Return a short name for each file: its scenario, or its path where two are of one scenario."""
+    scenarios = [trajectory.scenario for trajectory in trajectories]
+    return [
+        scenario if scenarios.count(scenario) == 1 else str(file)
+        for scenario, file in zip(scenarios, files, strict=True)
+    ]
 
 
 @app.command()
 def replay(
     file: File,
     html: Annotated[Path | None, typer.Option(help="Write a page that opens from disk, without a server.")] = None,
+    gif: Annotated[Path | None, typer.Option(help="Write a GIF that repeats.")] = None,
+    mp4: Annotated[Path | None, typer.Option(help="Write an MP4 film.")] = None,
+    snapshots: Annotated[Path | None, typer.Option(help="Write a PNG of the robot at several times.")] = None,
+    times: Annotated[str, typer.Option(help="Times of the snapshots [s], as 0,2.5,7.")] = "",
+    fps: Annotated[float | None, typer.Option(help="Frames a second. [GIF 12.5, MP4 25]")] = None,
+    meshes: Annotated[bool, typer.Option(help="Draw meshes where the robot has them.")] = True,
     robot: RobotOption = "",
 ) -> None:
-    """Replay a trajectory in the browser, live or as a page.
+    """Replay a trajectory in the browser, live or as a page, or render it; GIF, MP4 and PNG need Chromium or Chrome.
 
-    Example: multimodal-to replay results/take-off/trajectory.npz --html take-off.html
+    Example: multimodal-to replay results/take-off/trajectory.npz --html take-off.html --gif take-off.gif
     """
     the_robot, trajectory = _load(file, robot)
-    if html is not None:
-        _writable(html.parent)
-    from multimodal_to.replay import show, write_html
+    instants = _numbers("--times", times) if times else None
+    wanted = {".html": html, ".png": snapshots, ".gif": gif, ".mp4": mp4}
+    targets = {suffix: path for suffix, path in wanted.items() if path is not None}
+    for suffix, path in targets.items():
+        if path.suffix.lower() != suffix:
+            raise OutputError(f"'{path}' is no {suffix}")
+        _writable(path.parent)
+    from multimodal_to.replay import show, write_gif, write_html, write_mp4, write_snapshots
 
-    if html is not None:
-        _out.print(f"wrote {write_html(the_robot, trajectory, html)}", soft_wrap=True)
+    write = {
+        ".html": lambda path: write_html(the_robot, trajectory, path, meshes=meshes),
+        ".png": lambda path: write_snapshots(the_robot, trajectory, path, times=instants, meshes=meshes),
+        ".gif": lambda path: write_gif(the_robot, trajectory, path, rate=12.5 if fps is None else fps, meshes=meshes),
+        ".mp4": lambda path: write_mp4(the_robot, trajectory, path, rate=25.0 if fps is None else fps, meshes=meshes),
+    }
+    for suffix, path in targets.items():
+        _out.print(f"wrote {write[suffix](path)}", soft_wrap=True)
+    if targets:
         return
-    visualizer = show(the_robot, trajectory)
+    visualizer = show(the_robot, trajectory, meshes=meshes)
     _out.print(f"replaying at {visualizer.url()}; Ctrl-C ends", soft_wrap=True)
     visualizer.open()
     try:
@@ -222,6 +263,49 @@ def replay(
             time.sleep(1.0)
     except KeyboardInterrupt:
         _out.print()
+
+
+@app.command("report")
+def report_file(
+    file: File,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write. [FILE.html]")] = None,
+    meshes: Annotated[bool, typer.Option(help="Draw meshes where the robot has them.")] = True,
+    robot: RobotOption = "",
+) -> None:
+    """Write one page with replay, figures, audit and scenario of a trajectory; it opens from disk and prints.
+
+    Example: multimodal-to report results/take-off/trajectory.npz --output take-off.html
+    """
+    the_robot, trajectory = _load(file, robot)
+    target = output or file.with_suffix(".html")
+    if target.suffix.lower() != ".html":
+        raise OutputError(f"'{target}' is no .html")
+    _writable(target.parent)
+    from multimodal_to.report import write_report
+
+    _out.print(f"wrote {write_report(the_robot, trajectory, target, meshes=meshes)}", soft_wrap=True)
+
+
+@app.command("export")
+def export_file(
+    file: File,
+    to: Annotated[str, typer.Option("--to", help="csv, mat, mujoco or pinocchio.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write. [FILE.csv and so on]")] = None,
+    robot: RobotOption = "",
+) -> None:
+    """Write a trajectory for another program, with names, units and conventions.
+
+    Example: multimodal-to export results/take-off/trajectory.npz --to mujoco --output take-off-mujoco.npz
+    """
+    if to not in EXPORTS:
+        raise InputError(unknown("export", to, EXPORTS))
+    the_robot, trajectory = _load(file, robot)
+    suffix, write = EXPORTS[to]
+    target = output or (file.with_stem(f"{file.stem}-{to}") if suffix == ".npz" else file.with_suffix(suffix))
+    if target.suffix.lower() != suffix:
+        raise OutputError(f"'{target}' is no {suffix}")
+    _writable(target.parent)
+    _out.print(f"wrote {write(the_robot, trajectory, target)}", soft_wrap=True)
 
 
 @robot_app.command("info")
@@ -273,6 +357,17 @@ def audit_file(
             soft_wrap=True,
         )
     raise typer.Exit(0 if report.holds else 1)
+
+
+def _numbers(option: str, text: str) -> list[float]:
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError as error:
+        raise InputError(f"{option} is '{text}'; expected numbers with commas between them") from error
+
+
+def _show_warning(message: Warning | str, *_: object) -> None:
+    Console(stderr=True, highlight=False).print(f"warning: {message}", markup=False, soft_wrap=True)
 
 
 def _writable(folder: Path) -> Path:

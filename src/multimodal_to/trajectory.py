@@ -131,7 +131,8 @@ class Trajectory:
 
     def per_contact(self, name: str) -> Array:
         """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1)."""
-        return getattr(self, name).reshape(len(self.contact_names), -1, self.time.size)  # type: ignore[no-any-return]
+        rows = QUANTITIES[name].rows
+        return getattr(self, name).reshape(len(self.contact_names), rows, self.time.size)  # type: ignore[no-any-return]
 
     def vertical_contact_force(self) -> Array:
         """Return the sum of the world-vertical contact forces [N], (knots + 1,)."""

@@ -1,0 +1,80 @@
+"""Which contact points carry load when, the load of each foot, and the height of each foot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from multimodal_to.derived import FLIGHT_FORCE
+from multimodal_to.models.robot import Robot
+from multimodal_to.plotting.style import (
+    COLOURS,
+    Run,
+    draw_flight,
+    draw_limits,
+    finish,
+    legend_above,
+    new_figure,
+    runs_of,
+)  # fmt: skip
+from multimodal_to.trajectory import Array, Trajectory
+
+_BAR = 0.8  # of the height that a contact point has in the timeline
+
+
+def plot_contacts(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
+    """Plot a timeline of the contact points by foot, and each foot's vertical force [N] and least height [mm].
+
+    A bar spans the intervals over which a point's vertical force is above `derived.FLIGHT_FORCE`: the force at a knot
+    acts over the interval that ends there. Several runs stand below each other in the timeline.
+
+    Raises:
+        InputError: the trajectories are for different robots, or too many.
+    """
+    runs = runs_of(robot, trajectories, labels)
+    rows = max(len(robot.contacts) * len(runs), 1)
+    figure = new_figure(runs, "contacts", (8.0, 5.2 + 0.22 * rows))
+    timeline, force, height = figure.subplots(3, 1, sharex=True, height_ratios=[0.9 + 0.22 * rows, 2.0, 2.0])
+    feet = list(dict.fromkeys(contact.foot for contact in robot.contacts))
+    _draw_timeline(timeline, runs, feet)
+    for number, run in enumerate(runs):
+        forces, heights = (run.trajectory.per_contact(name)[:, 2] for name in ("contact_forces", "contact_positions"))
+        for foot, colour in zip(feet, COLOURS, strict=False):
+            members = [index for index, contact in enumerate(run.robot.contacts) if contact.foot == foot]
+            label = f"{foot} foot" if number == 0 else None
+            force.plot(run.time, forces[members].sum(axis=0), color=colour, linestyle=run.style, label=label)
+            height.plot(run.time, 1e3 * heights[members].min(axis=0), color=colour, linestyle=run.style)
+    draw_limits(force, {robot.weight}, "weight")
+    force.set_ylabel("vertical force [N]")
+    height.set_ylabel("least height [mm]")
+    height.set_xlabel("time [s]")
+    draw_flight((timeline, force, height), runs, labelled=force)
+    finish((force, height), 2.0)
+    legend_above(force)
+    figure.align_ylabels()
+    return figure
+
+
+def _draw_timeline(axes: Axes, runs: Sequence[Run], feet: Sequence[str]) -> None:
+    names: list[str] = []
+    for run in runs:
+        loaded = run.trajectory.per_contact("contact_forces")[:, 2] > FLIGHT_FORCE
+        for contact, row in zip(run.robot.contacts, loaded, strict=True):
+            colour = COLOURS[feet.index(contact.foot) % len(COLOURS)]
+            spans = [(start, end - start) for start, end in _spans(run.time, row)]
+            axes.broken_barh(spans, (len(names) - _BAR / 2, _BAR), facecolors=colour)
+            names.append(contact.frame if len(runs) == 1 else f"{contact.frame}, {run.label}")
+    axes.set_yticks(range(len(names)), names, fontsize="x-small")
+    axes.set_ylim(len(names) - 0.4, -0.6)
+    axes.set_ylabel("loaded")
+    axes.grid(axis="x", alpha=0.3)
+
+
+def _spans(time: Array, loaded: np.ndarray) -> list[tuple[float, float]]:
+    """Return start and end [s] of each run of intervals whose end is loaded."""
+    edges = np.concatenate(([False], loaded[1:], [False]))
+    starts, ends = np.flatnonzero(~edges[:-1] & edges[1:]), np.flatnonzero(edges[:-1] & ~edges[1:])
+    return [(float(time[i]), float(time[j])) for i, j in zip(starts, ends, strict=True)]

@@ -1,0 +1,134 @@
+"""Joint positions, speeds and torques over time, against their limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure, SubFigure
+
+from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
+from multimodal_to.derived import generalised_forces
+from multimodal_to.models.robot import Robot
+from multimodal_to.plotting.style import (
+    SMALL,
+    Run,
+    draw_flight,
+    draw_limits,
+    draw_lines,
+    finish,
+    new_figure,
+    pad,
+    runs_of,
+)
+from multimodal_to.trajectory import Array, Trajectory
+
+_COLUMNS = 6
+_CELL = (2.15, 1.55)  # [inch]
+
+
+def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
+    """Plot every joint's position [rad] over its whole range, which dashed lines end, and the speeds [rad/s] by group.
+
+    The limit of the speeds is dashed where it is near enough to be seen; the title of each panel says it.
+
+    Raises:
+        InputError: the trajectories are for different robots, or too many.
+    """
+    runs = runs_of(robot, trajectories, labels)
+    rows = -(-len(robot.joint_names) // _COLUMNS)
+    figure = new_figure(runs, "joints", (_COLUMNS * _CELL[0], (rows + 2.1) * _CELL[1]))
+    upper, lower = np.asarray(figure.subfigures(2, 1, height_ratios=[rows, 2.1]))
+    limits = robot.joint_limits
+    _cells(upper, runs, [run.trajectory.joint_positions for run in runs], "position [rad]", limits.lower, limits.upper,
+           whole_range=True)  # fmt: skip
+    _speeds(lower, robot, runs)
+    return figure
+
+
+def plot_torques(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
+    """Plot every joint's torque [N m] (`derived.generalised_forces`) and, dashed, the effort limits of the URDF.
+
+    The first knot, whose forces and velocities enter no dynamics, is left out; placeholders limit nothing.
+
+    Raises:
+        InputError: the trajectories are for different robots, or too many.
+    """
+    runs = runs_of(robot, trajectories, labels)
+    rows = -(-len(robot.joint_names) // _COLUMNS)
+    figure = new_figure(runs, "joint torques", (_COLUMNS * _CELL[0], (rows + 0.2) * _CELL[1]))
+    effort = np.where(robot.joint_limits.effort < EFFORT_PLACEHOLDER, robot.joint_limits.effort, np.nan)
+    values = [pad(generalised_forces(run.robot, run.trajectory)[6:]) for run in runs]
+    _cells(figure, runs, values, "torque [N m]", -effort, effort, whole_range=False)
+    return figure
+
+
+def _cells(
+    figure: Figure | SubFigure, runs: Sequence[Run], values: Sequence[Array], unit: str, lower: Array, upper: Array, *,
+    whole_range: bool,
+) -> None:  # fmt: skip
+    """Draw one small panel for each joint; NaN limits are none."""
+    names = runs[0].robot.joint_names
+    rows = -(-len(names) // _COLUMNS)
+    grid = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False)
+    for index, axes in enumerate(grid.ravel()):
+        if index >= len(names):
+            axes.set_axis_off()
+            continue
+        draw_lines(axes, runs, [rows_of_run[index : index + 1] for rows_of_run in values], ())
+        ends = [end for end in (float(lower[index]), float(upper[index])) if np.isfinite(end)]
+        largest = max(float(np.nanmax(np.abs(rows_of_run[index]))) for rows_of_run in values)
+        if whole_range or (ends and largest > 0.3 * ends[-1]):
+            draw_limits(axes, ends, None)
+        axes.set_title(_cell_title(names[index], ends, whole_range), fontsize=SMALL)
+        draw_flight([axes], runs)
+        finish([axes], 0.0 if whole_range else 1.0)
+        _tick(axes, bottom=index // _COLUMNS == rows - 1)
+    figure.supylabel(unit, fontsize="medium")
+
+
+def _cell_title(name: str, ends: Sequence[float], whole_range: bool) -> str:
+    return name if whole_range or not ends else f"{name} (±{ends[-1]:g})"
+
+
+def _speeds(figure: SubFigure, robot: Robot, runs: Sequence[Run]) -> None:
+    groups = _disjoint_groups(robot)
+    panels = figure.subplots(1, len(groups), sharex=True, squeeze=False)[0]
+    for axes, (name, members) in zip(panels, groups.items(), strict=True):
+        rows = [robot.joint_names.index(member) for member in members]
+        draw_lines(axes, runs, [run.trajectory.joint_velocities[rows] for run in runs], members)
+        limit = float(robot.joint_limits.speed[rows].min())
+        largest = max(float(np.abs(run.trajectory.joint_velocities[rows]).max()) for run in runs)
+        if largest > 0.3 * limit:
+            draw_limits(axes, (-limit, limit), None)
+        axes.set_title(f"{name.replace('_', ' ')} (±{limit:g})", fontsize=SMALL)
+        draw_flight([axes], runs)
+        finish([axes], 0.1)
+        _tick(axes, bottom=True)
+        axes.legend(
+            loc="upper center", bbox_to_anchor=(0.5, -0.24), ncols=2, frameon=False, fontsize="xx-small",
+            handlelength=1.4, columnspacing=0.8, borderpad=0.0,
+        )  # fmt: skip
+    figure.supylabel("speed [rad/s]", fontsize="medium")
+
+
+def _disjoint_groups(robot: Robot) -> dict[str, tuple[str, ...]]:
+    """Return the robot's first joint groups that have no joint in common, and the joints of none."""
+    chosen: dict[str, tuple[str, ...]] = {}
+    taken: set[str] = set()
+    for name, members in robot.joint_groups.items():
+        if members and not taken.intersection(members):
+            chosen[name] = members
+            taken.update(members)
+    if rest := tuple(name for name in robot.joint_names if name not in taken):
+        chosen["other joints" if chosen else "all joints"] = rest
+    return chosen
+
+
+def _tick(axes: Any, *, bottom: bool) -> None:
+    axes.tick_params(labelsize="x-small", labelbottom=bottom)
+    axes.locator_params(axis="x", nbins=4)
+    axes.locator_params(axis="y", nbins=4)
+    if bottom:
+        axes.set_xlabel("time [s]", fontsize=SMALL)

@@ -1,0 +1,103 @@
+"""How far a motion is from what it must not exceed: the slacks over time, and the audit's findings by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from multimodal_to.audit import Audit, audit
+from multimodal_to.findings import Finding
+from multimodal_to.models.robot import Robot
+from multimodal_to.plotting.style import (
+    COLOURS,
+    LIMIT,
+    SMALL,
+    Run,
+    draw_flight,
+    legend_above,
+    new_figure,
+    runs_of,
+)  # fmt: skip
+from multimodal_to.trajectory import Trajectory
+
+_FLOOR, _SLACK_FLOOR = 1e-6, 1e-8  # of what is drawn on the logarithmic axes
+_FAILED = "#d62728"
+
+
+def plot_margins(
+    robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None, audits: Sequence[Audit] | None = None
+) -> Figure:
+    """Plot the largest of each slack over time [N m], and the worst of each property of the audit over its limit [1].
+
+    Both axes are logarithmic and end at 1e-8 and 1e-6; a property that has nothing to show, as a penetration of less
+    than zero, has no bar. A bar that passes 1 fails. `audits` are those to show; by default each run is audited.
+
+    Raises:
+        InputError: the trajectories are for different robots, or too many.
+    """
+    runs = runs_of(robot, trajectories, labels)
+    reports = list(audits) if audits is not None else [audit(run.robot, run.trajectory) for run in runs]
+    count = len(_properties(reports))
+    figure = new_figure(runs, "slacks and audit", (8.0, 3.6 + count * (0.19 + 0.06 * (len(runs) - 1))))
+    slacks, properties = figure.subplots(2, 1, height_ratios=[2.2, count * 0.19])
+    _draw_slacks(slacks, runs)
+    _draw_findings(properties, runs, reports)
+    return figure
+
+
+def _draw_slacks(axes: Axes, runs: Sequence[Run]) -> None:
+    for number, run in enumerate(runs):
+        for name, colour, label in (
+            ("complementarity_slack", COLOURS[0], "complementarity, ε_n"), ("sliding_slack", COLOURS[1], "sliding, ε_t")
+        ):  # fmt: skip
+            largest = getattr(run.trajectory, name).max(axis=0, initial=0.0)
+            axes.semilogy(
+                run.time, np.maximum(largest, _SLACK_FLOOR), color=colour, linestyle=run.style,
+                label=label if number == 0 else None,
+            )  # fmt: skip
+    axes.set_ylim(_SLACK_FLOOR, max(1e-3, 3.0 * axes.get_ylim()[1]))
+    axes.set_ylabel("largest slack [N m]")
+    axes.set_xlabel("time [s]")
+    axes.margins(x=0.0)
+    axes.grid(alpha=0.3)
+    draw_flight([axes], runs, labelled=axes)
+    legend_above(axes)
+
+
+def _draw_findings(axes: Axes, runs: Sequence[Run], reports: Sequence[Audit]) -> None:
+    thickness, rows = 0.8 / len(runs), _properties(reports)
+    highest = 1.0
+    for number, report in enumerate(reports):
+        own = report.findings
+        shares = np.array([_share(finding) for finding in own])
+        highest = max(highest, shares.max(initial=0.0))
+        places = [list(rows).index(finding.name) + (number - (len(runs) - 1) / 2.0) * thickness for finding in own]
+        axes.barh(
+            places, np.maximum(shares, _FLOOR) - _FLOOR, left=_FLOOR, height=0.9 * thickness,
+            color=["0.55" if finding.holds else _FAILED for finding in own],
+            alpha=1.0 - 0.2 * number, hatch="" if number == 0 else "/" * (2 * number), edgecolor="white", linewidth=0.0,
+        )  # fmt: skip
+    axes.set_yticks(range(len(rows)), list(rows.values()), fontsize="x-small")
+    axes.set_xscale("log")
+    axes.set_xlim(_FLOOR, 10.0 * highest)
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.axvline(1.0, **LIMIT)
+    order = f"; from the top: {', '.join(run.label for run in runs)}" if len(runs) > 1 else ""
+    axes.set_xlabel(f"worst over limit; a bar that passes 1 fails{order}", fontsize=SMALL)
+    axes.grid(axis="x", alpha=0.3)
+
+
+def _properties(reports: Sequence[Audit]) -> dict[str, str]:
+    """Return the properties that any of the audits has, with what stands beside their bars."""
+    findings = {finding.name: finding for report in reports for finding in report.findings}
+    return {name: f"{name} / {finding.limit:.3g} {finding.unit}" for name, finding in findings.items()}
+
+
+def _share(finding: Finding) -> float:
+    """Return worst over limit; of what cannot be divided, far beyond it or nothing, as it fails or holds."""
+    if finding.limit > 0.0 and np.isfinite(finding.worst):
+        return finding.worst / finding.limit
+    return _FLOOR if finding.holds else 1e3

@@ -1,0 +1,144 @@
+"""How all figures look: colours, line styles, limits, bands of flight, legends that cover no data."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from multimodal_to.derived import flight_phases
+from multimodal_to.errors import InputError, OutputError
+from multimodal_to.models.robot import Robot
+from multimodal_to.trajectory import Array, Trajectory
+from multimodal_to.writing import whole
+
+SUFFIXES = (".png", ".svg", ".pdf")
+"""What a figure can be saved as."""
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # told apart by colour-blind eyes too
+STYLES = ("-", "--", "-.", ":")
+FLIGHT: dict[str, Any] = {"facecolor": "#d62728", "alpha": 0.12, "linewidth": 0.0, "zorder": 0.5}
+LIMIT: dict[str, Any] = {"color": "0.35", "linestyle": (0, (6, 4)), "linewidth": 0.8}
+SMALL = "small"  # text of legends and ticks
+_LEGEND_ROWS = 2
+_DPI = 150
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Run:
+    """One trajectory in a figure: with the robot that has its jets, and the line style and name that tell it apart."""
+
+    robot: Robot
+    trajectory: Trajectory
+    label: str
+    style: Any
+
+    @property
+    def time(self) -> Array:
+        """Return the knots [s]."""
+        return self.trajectory.time
+
+
+def runs_of(robot: Robot, trajectories: Sequence[Trajectory], labels: Sequence[str] | None) -> list[Run]:
+    """Return the trajectories as the runs of one figure.
+
+    Raises:
+        InputError: there are none or too many, they are for different robots, or labels are not one for each.
+    """
+    if not 1 <= len(trajectories) <= len(STYLES):
+        raise InputError(f"a figure shows 1 to {len(STYLES)} trajectories; there are {len(trajectories)}")
+    for trajectory in trajectories:
+        if trajectory.joint_names != robot.joint_names:
+            raise InputError(f"the trajectory '{trajectory.scenario}' is for {trajectory.robot}, not for {robot.name}")
+    names = list(labels) if labels is not None else [trajectory.scenario for trajectory in trajectories]
+    if len(names) != len(trajectories):
+        raise InputError(f"there are {len(trajectories)} trajectories and {len(names)} labels; expected one for each")
+    return [
+        Run(robot=robot.with_jets(trajectory.jet_names), trajectory=trajectory, label=name, style=style)
+        for trajectory, name, style in zip(trajectories, names, STYLES, strict=False)
+    ]
+
+
+def new_figure(runs: Sequence[Run], what: str, size: tuple[float, float]) -> Figure:
+    """Return an empty figure with a title; several runs are told apart by line style, in a legend below."""
+    figure = Figure(figsize=size, layout="constrained")
+    title = " and ".join(dict.fromkeys(run.trajectory.scenario for run in runs))
+    figure.suptitle(f"{title} · {runs[0].trajectory.robot}: {what}")
+    if len(runs) > 1:
+        handles = [Line2D([], [], color="0.2", linestyle=run.style) for run in runs]
+        figure.legend(handles, [run.label for run in runs], loc="outside lower center", ncols=len(runs), frameon=False)
+    return figure
+
+
+def draw_lines(axes: Axes, runs: Sequence[Run], values: Iterable[Array], names: Iterable[str]) -> None:
+    """Draw rows (rows, knots + 1) of each run: the colour tells the row, the style the run or, of one run, the row."""
+    labels = list(names)
+    for number, (run, rows) in enumerate(zip(runs, values, strict=True)):
+        for index, row in enumerate(rows):
+            style = run.style if len(runs) > 1 else STYLES[index % len(STYLES)] if len(rows) <= len(STYLES) else "-"
+            axes.plot(
+                run.time, row, color=COLOURS[index % len(COLOURS)], linestyle=style,
+                label=labels[index] if number == 0 and index < len(labels) else None,
+            )  # fmt: skip
+
+
+def draw_limits(axes: Axes, values: Iterable[float], label: str | None) -> None:
+    """Draw limits as dashed lines, with one entry in the legend."""
+    for index, value in enumerate(sorted(values)):
+        axes.axhline(value, label=label if index == 0 else None, **LIMIT)
+
+
+def draw_flight(all_axes: Iterable[Axes], runs: Sequence[Run], labelled: Axes | None = None) -> None:
+    """Draw a translucent red band over the flight of every run, with one entry in the legend of one of the axes."""
+    phases = [phase for run in runs for phase in flight_phases(run.trajectory)]
+    for axes in all_axes:
+        for index, (start, end) in enumerate(phases):
+            axes.axvspan(start, end, label="flight" if axes is labelled and index == 0 else None, **FLIGHT)
+
+
+def finish(all_axes: Iterable[Axes], least_span: float = 0.0) -> None:
+    """Give axes a grid, room above and below the data, and a range of at least `least_span`."""
+    for axes in all_axes:
+        axes.margins(x=0.0, y=0.08)
+        axes.grid(alpha=0.3)
+        low, high = axes.get_ylim()
+        if high - low < least_span:
+            middle = (low + high) / 2.0
+            axes.set_ylim(middle - least_span / 2.0, middle + least_span / 2.0)
+
+
+def legend_above(axes: Axes) -> None:
+    """Put the legend of axes above them, where it covers nothing."""
+    entries = len(axes.get_legend_handles_labels()[1])
+    if entries == 0:
+        return
+    columns = entries if entries <= 4 else -(-entries // _LEGEND_ROWS)
+    axes.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, ncols=columns, frameon=False, fontsize=SMALL
+    )
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
+    """Write a figure as PNG, SVG or PDF, by its suffix; whole or not at all.
+
+    Raises:
+        OutputError: the suffix is another one, or the folder cannot be written.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in SUFFIXES:
+        raise OutputError(f"'{target}' is no .png, .svg or .pdf")
+    with whole(target) as draft:
+        figure.savefig(draft, dpi=_DPI)
+    return target
+
+
+def pad(values: Array) -> Array:
+    """Return an array with a NaN in place of its first column: for what has no meaning at the first knot."""
+    return np.column_stack([np.full(values.shape[0], np.nan), values[:, 1:]])

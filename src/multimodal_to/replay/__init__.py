@@ -1,0 +1,23 @@
+"""Replay of a `Trajectory`: pages that open from disk without a network, films and stills of them, a live viewer.
+
+All are drawn by meshcat. Links are nested in the scene as they are in the URDF, and keyframes are the knots: between
+two of them the viewer moves positions linearly and turns rotations about a fixed axis (slerp), so each joint moves
+linearly and the links stay together.
+"""
+
+from multimodal_to.replay.live import show
+from multimodal_to.replay.meshes import MeshWarning
+from multimodal_to.replay.page import player, write_html, write_still_html
+from multimodal_to.replay.pictures import snapshot_times, write_gif, write_mp4, write_snapshots
+
+__all__ = [
+    "MeshWarning",
+    "player",
+    "show",
+    "snapshot_times",
+    "write_gif",
+    "write_html",
+    "write_mp4",
+    "write_snapshots",
+    "write_still_html",
+]

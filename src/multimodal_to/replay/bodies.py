@@ -1,0 +1,89 @@
+"""The links of a robot in the scene, nested as in the URDF, so that joints move them and they stay together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from multimodal_to.derived import frame_poses
+from multimodal_to.models.robot import Robot
+from multimodal_to.replay.meshes import shaded
+from multimodal_to.replay.scene import Y_TO_Z, Scene, SmoothMesh, quaternions, shapes
+from multimodal_to.replay.visuals import Appearance, Visual, parse
+from multimodal_to.trajectory import Array, Trajectory
+
+Drawn = tuple[Any, Any, Array]
+"""Geometry, material and transform of a visual, as the scene takes them."""
+
+
+def link_paths(robot: Robot, appearance: Appearance, root: str) -> dict[str, str]:
+    """Return where in the scene the links are that have a shape or a jet: each below the nearest such link above it."""
+    described = parse(robot.urdf)
+    shown = {visual.link for visual in appearance.visuals} | {jet.frame for jet in robot.jets}
+    above = {joint.child: joint.parent for joint in described.joints}
+
+    def path(name: str) -> str:
+        parent = above.get(name)
+        while parent is not None and parent not in shown:
+            parent = above.get(parent)
+        return f"{root}/{name}" if parent is None else f"{path(parent)}/{name}"
+
+    return {link.name: path(link.name) for link in described.links if link.name in shown}
+
+
+def link_poses(robot: Robot, trajectory: Trajectory, paths: Mapping[str, str]) -> dict[str, Array]:
+    """Return the pose of each link in its parent in the scene at every knot, (knots + 1, 4, 4)."""
+    poses = {name: frame_poses(robot, trajectory, name) for name in paths}
+    parents = {name: path.split("/")[-2] for name, path in paths.items()}
+    return {
+        name: np.linalg.inv(poses[parents[name]]) @ pose if parents[name] in poses else pose
+        for name, pose in poses.items()
+    }
+
+
+def draw_links(scene: Scene, paths: Mapping[str, str], poses: Mapping[str, Array]) -> None:
+    """Let the links of `paths` move as their poses say, (knots + 1, 4, 4) each."""
+    for name, path in paths.items():
+        scene.set(path, "position", poses[name][:, :3, 3])
+        scene.set(path, "quaternion", quaternions(poses[name]))
+
+
+def draw_visuals(scene: Scene, paths: Mapping[str, str], visuals: Mapping[Visual, Drawn]) -> None:
+    """Put the visuals on their links."""
+    for visual, (geometry, material, transform) in visuals.items():
+        scene.add(f"{paths[visual.link]}/{visual.name}", geometry, material, transform)
+
+
+def drawn(visual: Visual) -> Drawn:
+    """Return a visual in three.js's words."""
+    material = _material(visual, 1.0)
+    if visual.part is not None:
+        return SmoothMesh(*shaded(visual.part)), material, visual.transform
+    geometry, turned = _primitive(visual.primitive)
+    return geometry, material, visual.transform @ turned
+
+
+def faded(visuals: Mapping[Visual, Drawn], opacity: float) -> dict[Visual, Drawn]:
+    """Return the visuals with their opacity times the one given."""
+    return {
+        visual: (geometry, _material(visual, opacity), transform)
+        for visual, (geometry, _, transform) in visuals.items()
+    }
+
+
+def _material(visual: Visual, opacity: float) -> Any:
+    red, green, blue = (round(255 * part) for part in visual.rgba[:3])
+    return shapes.MeshPhongMaterial(
+        color=red << 16 | green << 8 | blue, opacity=visual.rgba[3] * opacity, specular=0x222222, shininess=25
+    )
+
+
+def _primitive(geometry: Any) -> tuple[Any, Array]:
+    """Return meshcat's geometry for a box, cylinder or sphere of the URDF, and how it must be turned."""
+    if geometry.box is not None:
+        return shapes.Box([float(length) for length in geometry.box.size]), np.eye(4)
+    if geometry.cylinder is not None:
+        return shapes.Cylinder(float(geometry.cylinder.length), float(geometry.cylinder.radius)), Y_TO_Z
+    return shapes.Sphere(float(geometry.sphere.radius)), np.eye(4)

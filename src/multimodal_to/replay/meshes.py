@@ -1,0 +1,154 @@
+"""Mesh files of a URDF: where they are, what is wrong with those that cannot be used, and their triangles."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+import trimesh
+
+from multimodal_to.errors import MultimodalError
+from multimodal_to.trajectory import Array
+
+ROOT_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH")
+"""Environment variables that list folders in which packages of meshes lie."""
+
+_POINTER = b"version https://git-lfs"
+_SCHEMES = ("package://", "model://")
+
+
+class MeshWarning(UserWarning):
+    """Meshes that a robot names but that cannot be drawn."""
+
+
+class _UnusableError(MultimodalError):
+    """Why a mesh cannot be used."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Part:
+    """Triangles of one colour, in metres in the frame of the visual."""
+
+    vertices: Array  # (n, 3) [m]
+    faces: np.ndarray  # (m, 3), indices of vertices
+    rgba: tuple[float, ...] | None  # None: the file states none
+
+
+def load_parts(uri: str, urdf: Path, scale: Array) -> list[Part]:
+    """Return the triangles of a mesh that a URDF names, one part per colour of the file.
+
+    Raises:
+        MultimodalError: the file is missing, outside its root, a git-LFS pointer, or no mesh.
+    """
+    file = find_mesh(uri, urdf)
+    with file.open("rb") as stream:
+        if stream.read(len(_POINTER)) == _POINTER:
+            raise _UnusableError("a git-LFS pointer; `git lfs pull` fetches the mesh")
+    try:
+        scene = trimesh.load_scene(file)
+        meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
+    except Exception as error:  # readers of a dozen formats raise whatever they run into
+        raise _UnusableError(f"no mesh that can be read: {error}") from error
+    if not meshes:
+        raise _UnusableError("holds no triangles")
+    return [Part(vertices=mesh.vertices * scale, faces=np.asarray(mesh.faces), rgba=_colour(mesh)) for mesh in meshes]
+
+
+def find_mesh(uri: str, urdf: Path) -> Path:
+    """Return the file that a mesh's address in a URDF means.
+
+    `package://NAME/PATH` and `model://NAME/PATH` mean PATH in the folder NAME: one that holds the URDF, or lies beside
+    it or beside a folder above it, or in a folder of `ROOT_VARIABLES`, or in the installed example-robot-data. Any
+    other path is relative to the URDF, or absolute. No path may leave its root by `..`: that is the folder NAME, or
+    the package that holds the URDF (else the folder above it).
+
+    Raises:
+        MultimodalError: there is no such file, or the path leaves its root.
+    """
+    if (scheme := next((scheme for scheme in _SCHEMES if uri.startswith(scheme)), None)) is not None:
+        name, _, inside = unquote(uri.removeprefix(scheme)).partition("/")
+        candidates = [(root, root / inside) for root in _package_folders(name, urdf)]
+    else:
+        path = Path(unquote(uri.removeprefix("file://")) if uri.startswith("file://") else uri)
+        candidates = [(_own_root(urdf), urdf.absolute().parent / path)]
+    refused = False
+    for root, candidate in candidates:
+        plain = Path(os.path.normpath(candidate))
+        if not plain.is_relative_to(os.path.normpath(root)):
+            refused = True
+        elif plain.is_file():
+            return plain
+    raise _UnusableError("leaves the folder of its robot" if refused else "not found")
+
+
+def _package_folders(name: str, urdf: Path) -> Iterator[Path]:
+    if name in ("", ".", ".."):
+        return
+    for folder in urdf.absolute().parents:
+        if folder.name == name:
+            yield folder
+        yield folder / name
+    for variable in ROOT_VARIABLES:
+        for entry in filter(None, os.environ.get(variable, "").split(os.pathsep)):
+            yield Path(entry) / name
+            yield Path(entry) / "share" / name
+    if name == "example-robot-data" and (share := package_file(name, "example-robot-data/package.xml")) is not None:
+        yield share.parent
+
+
+def _own_root(urdf: Path) -> Path:
+    folders = urdf.absolute().parents
+    packages = (
+        folder for folder in folders if any((folder / mark).is_file() for mark in ("package.xml", "robot.toml"))
+    )
+    return next(packages, folders[min(1, len(folders) - 1)])
+
+
+def package_file(package: str, ending: str) -> Path | None:
+    """Return the file of an installed package whose path ends so; None where the package is not installed."""
+    try:
+        files = metadata.files(package) or []
+    except metadata.PackageNotFoundError:
+        return None
+    found = (Path(str(file.locate())) for file in files if f"/{file.as_posix()}".endswith(f"/{ending}"))
+    return next((Path(os.path.normpath(path)) for path in found if path.is_file()), None)
+
+
+def _colour(mesh: Any) -> tuple[float, ...] | None:
+    """Return the one colour of a mesh whose file states colours: its material's, or the mean of its faces'."""
+    if not mesh.visual.defined:
+        return None
+    if mesh.visual.kind == "texture":
+        colour = np.asarray(mesh.visual.material.main_color, dtype=float)
+    else:
+        colour = np.asarray(mesh.visual.face_colors, dtype=float).mean(axis=0)
+    return tuple(colour / 255.0)
+
+
+def simplified(parts: list[Part], faces: int) -> list[Part]:
+    """Return the parts with at most about so many triangles in all, each part thinned out in the same proportion."""
+    total = sum(len(part.faces) for part in parts)
+    if total <= faces:
+        return parts
+    return [_simplified(part, faces / total) for part in parts]
+
+
+def _simplified(part: Part, share: float) -> Part:
+    mesh = trimesh.Trimesh(part.vertices, part.faces)  # merges vertices that coincide, as those of STL
+    count = max(round(share * len(mesh.faces)), min(len(mesh.faces), 12))
+    if count >= len(mesh.faces):
+        return part
+    mesh = mesh.simplify_quadric_decimation(face_count=count)
+    return Part(vertices=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces), rgba=part.rgba)
+
+
+def shaded(part: Part, crease: float = np.radians(35.0)) -> tuple[Array, np.ndarray, Array]:
+    """Return vertices, faces and normals such that edges sharper than the crease [rad] look sharp, others smooth."""
+    mesh = trimesh.graph.smooth_shade(trimesh.Trimesh(part.vertices, part.faces), angle=crease, facet_minarea=None)
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces), np.asarray(mesh.vertex_normals)

@@ -1,0 +1,199 @@
+"""A motion as a scene that moves, and as one still scene with the robot at several times."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from multimodal_to.derived import frame_poses, resample
+from multimodal_to.errors import InputError
+from multimodal_to.models.robot import Robot
+from multimodal_to.models.terrain import FlatGround, Surface
+from multimodal_to.ocp.scenario_data import stored
+from multimodal_to.replay.bodies import draw_links, draw_visuals, drawn, faded, link_paths, link_poses
+from multimodal_to.replay.effects import draw_com, draw_com_trace, draw_contact_forces, draw_flames
+from multimodal_to.replay.scene import Scene, meshcat
+from multimodal_to.replay.stage import View, draw_stage
+from multimodal_to.replay.visuals import Appearance, Visual
+from multimodal_to.trajectory import QUANTITIES, Array, Trajectory
+
+FOLLOW_FROM = 0.6
+"""The camera follows the CoM along the ground in motions that go farther than this [m]."""
+
+_HALF_LEFT = np.array([-0.72, -0.66, 0.22])  # where the camera is, seen from a robot that faces −x
+_FROM_THE_SIDE = 0.14  # how high the camera of a still scene is, per metre of distance
+_STILL_ZOOM = 4.0  # from farther off, so that ghosts look alike
+_GAP = 0.25  # between the ghosts of a motion that stays in its place, per width of the robot
+_FAINTEST = 0.45  # opacity of the first of the ghosts that may overlap
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Picture:
+    """How the scene is to be looked at: where it stands before the camera, and how that follows the CoM."""
+
+    home: Array  # of the scene's root, (3,) [m]
+    way: Array  # of the scene's root at every knot, so that the CoM stays before the camera, (knots + 1, 3) [m]
+    follow: bool
+    still: bool
+    labels: tuple[tuple[str, Array], ...] = ()  # texts, and where in the world they stand
+
+
+def draw_motion(
+    visualizer: meshcat.Visualizer, robot: Robot, trajectory: Trajectory, look: Appearance, *, follow_here: bool = False
+) -> Picture:
+    """Draw stage, robot, flames, contact forces and CoM, and set the animation that moves them, at true speed.
+
+    With `follow_here` the animation also moves the scene so that the camera follows; else that is left to the page.
+    """
+    scene = Scene(visualizer=visualizer, time=trajectory.time - trajectory.time[0])
+    com = trajectory.com_position.T * [1.0, 1.0, 0.0]
+    span = np.ptp(com, axis=0)
+    follow = bool(np.linalg.norm(span) > FOLLOW_FROM)
+    low, high = _extent(robot, trajectory, look.visuals, com - com[0] if follow else np.zeros_like(com))
+    view = _view(low, high, _HALF_LEFT)
+    draw_stage(scene, view, _surface(trajectory), reach=float(span.max()))
+
+    paths = link_paths(robot, look, "robot")
+    draw_links(scene, paths, link_poses(robot, trajectory, paths))
+    draw_visuals(scene, paths, {visual: drawn(visual) for visual in look.visuals})
+    draw_flames(scene, robot, trajectory.thrust, paths)
+    draw_contact_forces(scene, robot, trajectory)
+    draw_com(scene, trajectory)
+    way = -view.middle - (com - com[0])
+    if follow and follow_here:
+        scene.move("", "position", way)
+    visualizer.set_animation(scene.animation, play=True, repetitions=math.inf)
+    return Picture(home=-view.middle, way=way, follow=follow, still=False)
+
+
+def draw_still(
+    visualizer: meshcat.Visualizer, robot: Robot, trajectory: Trajectory, times: Array, look: Appearance, aspect: float
+) -> Picture:
+    """Draw the robot at several times [s] in one scene, with its flames and contact forces, and a label under each.
+
+    Where it travels far enough from one to the next, ghosts stand where they were, the earlier the fainter; else they
+    stand side by side, from left to right, which ground that is not flat forbids.
+
+    Raises:
+        InputError: a time is not within the trajectory, or times do not increase.
+    """
+    instants = np.asarray(times, dtype=float)
+    if instants.size == 0 or (np.diff(instants) <= 0.0).any():
+        raise InputError(f"the times of the snapshots are {instants.tolist()}; expected times that increase [s]")
+    ghosts = _frozen(trajectory, instants)
+    surface = _surface(trajectory)
+    direction, offsets, apart = _layout(robot, ghosts, look.visuals, level=isinstance(surface, FlatGround))
+    corners = [
+        np.array(_extent(robot, ghost, look.visuals, np.zeros((2, 3)))) + offset
+        for ghost, offset in zip(ghosts, offsets, strict=True)
+    ]
+    low, high = np.min([pair[0] for pair in corners], axis=0), np.max([pair[1] for pair in corners], axis=0)
+    view = _view(low, high, direction, aspect=aspect, zoom=_STILL_ZOOM)
+    scene = Scene(visualizer=visualizer, time=np.zeros(1))
+    draw_stage(scene, view, surface)
+    bodies = {visual: drawn(visual) for visual in look.visuals}
+    opacities = np.ones(len(ghosts)) if apart else np.linspace(_FAINTEST, 1.0, len(ghosts))
+    for index, (ghost, offset, opacity) in enumerate(zip(ghosts, offsets, opacities.tolist(), strict=True)):
+        paths = link_paths(robot, look, f"ghost_{index}/robot")
+        draw_links(scene, paths, link_poses(robot, ghost, paths))
+        draw_visuals(scene, paths, bodies if opacity == 1.0 else faded(bodies, opacity))
+        draw_flames(scene, robot, ghost.thrust, paths, opacity)
+        draw_contact_forces(scene, robot, ghost, f"ghost_{index}/contact_forces")
+        visualizer[f"ghost_{index}"].set_property("position", offset.tolist())
+    if not apart:
+        draw_com_trace(scene, trajectory)
+    toward = np.array([*direction[:2], 0.0]) / np.linalg.norm(direction[:2])
+    labels = tuple(
+        (f"{instant:.1f} s", np.array([*(ghost.com_position[:2, 0] + offset[:2]), 0.0]) + 0.35 * toward)
+        for instant, ghost, offset in zip(instants, ghosts, offsets, strict=True)
+    )
+    return Picture(home=-view.middle, way=np.zeros((0, 3)), follow=False, still=True, labels=labels)
+
+
+def _surface(trajectory: Trajectory) -> Surface:
+    """Return the ground of the scenario that the trajectory keeps; flat where it keeps none."""
+    scenario = stored(trajectory)
+    return FlatGround() if scenario is None else scenario.surface
+
+
+def _frozen(trajectory: Trajectory, instants: Array) -> list[Trajectory]:
+    """Return for each instant [s] a trajectory of two knots that both show it."""
+    times = np.union1d(instants, trajectory.time[[0, -1]])  # a trajectory has at least two knots
+    sampled = resample(trajectory, times)
+    return [
+        replace(
+            sampled, time=np.array([0.0, 1.0]), **{name: getattr(sampled, name)[:, [at, at]] for name in QUANTITIES}
+        )
+        for at in np.searchsorted(times, instants)
+    ]
+
+
+def _layout(
+    robot: Robot, ghosts: list[Trajectory], visuals: tuple[Visual, ...], *, level: bool
+) -> tuple[Array, Array, bool]:
+    """Return the camera's direction, how far each ghost is moved aside (ghosts, 3), and whether they were moved."""
+    low, high = _extent(robot, ghosts[0], visuals, np.zeros((2, 3)))
+    width = float(np.linalg.norm((high - low)[:2])) / math.sqrt(2.0)
+    places = np.array([ghost.com_position[:, 0] * [1.0, 1.0, 0.0] for ghost in ghosts])
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    if not level and (len(ghosts) < 2 or not steps.any()):
+        return _HALF_LEFT, np.zeros((len(ghosts), 3)), True
+    if len(ghosts) > 1 and (steps.min() > 0.5 * width or not level):
+        farthest = places[np.linalg.norm(places - places[0], axis=1).argmax()] - places[0]
+        travel = farthest / np.linalg.norm(farthest)
+        side = np.array([travel[1], -travel[0], _FROM_THE_SIDE])  # from there the motion goes from left to right
+        return side, np.zeros((len(ghosts), 3)), False
+    direction = np.array([*_HALF_LEFT[:2], _FROM_THE_SIDE])
+    right = np.array([-direction[1], direction[0], 0.0]) / np.linalg.norm(direction[:2])
+    shares = np.arange(len(ghosts)) - (len(ghosts) - 1) / 2.0
+    return direction, shares[:, None] * (1.0 + _GAP) * width * right - (places - places.mean(axis=0)), True
+
+
+def _view(low: Array, high: Array, direction: Array, **more: float) -> View:
+    """Return the view of a box that reaches down to the ground."""
+    ground = np.array([*low[:2], min(low[2], 0.0)])
+    size, middle = high - ground, (high + ground) / 2.0
+    toward = np.abs(direction[:2]) / np.linalg.norm(direction[:2])
+    width, depth = float(toward[::-1] @ size[:2]), float(toward @ size[:2])
+    return View(middle=middle, width=width, height=float(size[2]), depth=depth, direction=direction, **more)
+
+
+def _extent(robot: Robot, trajectory: Trajectory, visuals: tuple[Visual, ...], moved: Array) -> tuple[Array, Array]:
+    """Return the corners of the box around the robot at all knots, each seen from `moved` (knots + 1, 3) [m]."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for link, points in _points(visuals).items():
+        poses = frame_poses(robot, trajectory, link)
+        world = points @ poses[:, :3, :3].transpose(0, 2, 1) + (poses[:, :3, 3] - moved)[:, None, :]
+        low, high = np.minimum(low, world.min(axis=(0, 1))), np.maximum(high, world.max(axis=(0, 1)))
+    if np.isfinite(low).all():
+        return low, high
+    com = trajectory.com_position.T - moved  # of a robot without a shape
+    return com.min(axis=0) - 0.5, com.max(axis=0) + 0.5
+
+
+def _points(visuals: tuple[Visual, ...]) -> Mapping[str, Array]:
+    """Return points (n, 3) in each link's frame in whose hull its visuals lie."""
+    found: dict[str, list[Array]] = {}
+    for visual in visuals:
+        if visual.part is not None:
+            low, high = visual.part.vertices.min(axis=0), visual.part.vertices.max(axis=0)
+        else:
+            high = _half_size(visual)
+            low = -high
+        corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+        found.setdefault(visual.link, []).append(corners @ visual.transform[:3, :3].T + visual.transform[:3, 3])
+    return {link: np.vstack(parts) for link, parts in found.items()}
+
+
+def _half_size(visual: Visual) -> Array:
+    """Return half the edges of the box around a primitive [m], (3,)."""
+    shape = visual.primitive
+    assert shape is not None
+    if shape.box is not None:
+        return np.asarray(shape.box.size, dtype=float) / 2.0
+    if shape.cylinder is not None:
+        return np.array([shape.cylinder.radius, shape.cylinder.radius, shape.cylinder.length / 2.0], dtype=float)
+    return np.full(3, float(shape.sphere.radius))

@@ -1,0 +1,111 @@
+"""The page that plays a motion: one file that opens from disk and fetches nothing."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import os
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from multimodal_to.derived import flight_phases
+from multimodal_to.models.robot import Robot
+from multimodal_to.replay.motion import Picture, draw_motion, draw_still
+from multimodal_to.replay.scene import HOLD, Recorder, meshcat
+from multimodal_to.replay.visuals import appearance
+from multimodal_to.trajectory import Array, Trajectory
+from multimodal_to.writing import write_text
+
+_VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
+_LEGEND = (
+    ("#f58a24", "flame: thrust of a jet"),
+    ("#1fa34a", "arrow: contact force"),
+    ("#2b6ce0", "sphere and line: centre of mass"),
+)
+_FLIGHT = ("#d62728", "bar above the time: flight")
+
+
+def write_html(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *, meshes: bool = True) -> Path:
+    """Write one page that plays the motion in a browser, from disk, with networking off; whole or not at all.
+
+    Opened with ``#t=2.5`` at its address's end, it stands still at 2.5 s; ``#t=2.5&bare`` hides the panels as well.
+
+    Raises:
+        OutputError: the folder does not exist or cannot be written.
+    """
+    return write_text(path, _page(trajectory, player(robot, trajectory, meshes=meshes)))
+
+
+def write_still_html(
+    robot: Robot, trajectory: Trajectory, times: Array, path: str | os.PathLike[str], *,
+    aspect: float, meshes: bool = True,
+) -> Path:  # fmt: skip
+    """Write a page with the robot at several times [s] in one still scene, for a picture of that width over height.
+
+    Raises:
+        InputError: a time is not within the trajectory.
+        OutputError: the folder does not exist or cannot be written.
+    """
+    recorder, look = Recorder(), appearance(robot.urdf, meshes=meshes)
+    picture = draw_still(meshcat.Visualizer(window=recorder), robot, trajectory, times, look, aspect)
+    return write_text(path, _page(trajectory, _player(trajectory, recorder, picture, look.attribution)))
+
+
+def player(robot: Robot, trajectory: Trajectory, *, meshes: bool = True) -> str:
+    """Return the HTML that plays the motion, for a page that has one: a block as high as what it stands in."""
+    recorder, look = Recorder(), appearance(robot.urdf, meshes=meshes)
+    picture = draw_motion(meshcat.Visualizer(window=recorder), robot, trajectory, look)
+    return _player(trajectory, recorder, picture, look.attribution)
+
+
+def _page(trajectory: Trajectory, content: str) -> str:
+    return _template("page.html").substitute(title=_title(trajectory), player=content)
+
+
+def _player(trajectory: Trajectory, recorder: Recorder, picture: Picture, attribution: str) -> str:
+    phases = [] if picture.still else flight_phases(trajectory)
+    legend = (*_LEGEND, _FLIGHT) if phases else _LEGEND
+    return _template("player.html").substitute(
+        title=_title(trajectory),
+        legend="".join(f'<div><span class="key" style="background: {colour}"></span>{text}</div>'
+                       for colour, text in legend if trajectory.jet_names or not text.startswith("flame")),
+        credit=f'<div class="panel credit">{html.escape(attribution)}</div>' if attribution else "",
+        bands="".join(_band(trajectory, *phase) for phase in phases),
+        duration=f"{trajectory.duration:.6f}",
+        viewer=_VIEWER.read_text(encoding="utf-8"),
+        scene=_json(_content(trajectory, recorder, picture)),
+    )  # fmt: skip
+
+
+def _content(trajectory: Trajectory, recorder: Recorder, picture: Picture) -> dict[str, Any]:
+    return {
+        "duration": trajectory.duration,
+        "hold": HOLD,
+        "still": picture.still,
+        "follow": picture.follow,
+        "times": (trajectory.time - trajectory.time[0]).tolist(),
+        "home": picture.home.tolist(),
+        "way": picture.way.tolist(),
+        "labels": [{"text": text, "position": place.tolist()} for text, place in picture.labels],
+        "commands": [base64.b64encode(command).decode("ascii") for command in recorder.commands],
+    }
+
+
+def _title(trajectory: Trajectory) -> str:
+    return html.escape(f"{trajectory.scenario} · {trajectory.robot}")
+
+
+def _band(trajectory: Trajectory, start: float, end: float) -> str:
+    left, width = ((instant / trajectory.duration) for instant in (start - trajectory.time[0], end - start))
+    return f'<span class="band" style="left: {100 * left:.3f}%; width: {100 * width:.3f}%" title="flight"></span>'
+
+
+def _json(content: Any) -> str:
+    return json.dumps(content, separators=(",", ":")).replace("</", "<\\/")
+
+
+def _template(name: str) -> Template:
+    return Template(resources.files("multimodal_to.replay").joinpath(name).read_text(encoding="utf-8"))

@@ -1,0 +1,131 @@
+"""Films and stills of a motion, taken of its page by a headless browser."""
+
+from __future__ import annotations
+
+import io
+import os
+import tempfile
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from multimodal_to.derived import flight_phases
+from multimodal_to.errors import InputError, OutputError
+from multimodal_to.models.robot import Robot
+from multimodal_to.replay.browser import open_browser
+from multimodal_to.replay.page import write_html, write_still_html
+from multimodal_to.replay.scene import HOLD
+from multimodal_to.trajectory import Array, Trajectory
+from multimodal_to.writing import whole
+
+GIF_SIZE, MP4_SIZE = (640, 560), (960, 720)  # [pixel]
+SNAPSHOT_SIZE = (400, 760)  # of each robot in a still scene [pixel]
+_COLOURS = 128  # of a GIF
+
+
+def write_gif(
+    robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *,
+    rate: float = 12.5, size: tuple[int, int] = GIF_SIZE, meshes: bool = True,
+) -> Path:  # fmt: skip
+    """Write the motion as a GIF that repeats, at true speed, of `rate` frames a second.
+
+    Raises:
+        InputError: the rate is not positive.
+        OutputError: there is no browser, or the file cannot be written.
+    """
+    times = _frame_times(trajectory, rate)
+    with whole(path) as draft:
+        frames = [Image.open(io.BytesIO(shot)).convert("RGB") for shot in _film(robot, trajectory, times, size, meshes)]
+        palette = frames[len(frames) // 2].quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
+        pictures = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+        ends = np.round(100.0 * np.append(times[1:], times[-1] + HOLD))  # a GIF counts hundredths of a second
+        delays = 10.0 * np.diff(ends, prepend=0.0)
+        pictures[0].save(
+            draft, save_all=True, append_images=pictures[1:], duration=delays.tolist(), loop=0, optimize=False
+        )
+    return Path(path)
+
+
+def write_mp4(
+    robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *,
+    rate: float = 25.0, size: tuple[int, int] = MP4_SIZE, meshes: bool = True,
+) -> Path:  # fmt: skip
+    """Write the motion as an MP4 (H.264), at true speed, of `rate` frames a second; the last pose stands for a second.
+
+    Raises:
+        InputError: the rate is not positive.
+        OutputError: there is no browser or no imageio-ffmpeg, or the file cannot be written.
+    """
+    try:
+        import imageio_ffmpeg
+    except ImportError as error:
+        raise OutputError("MP4 needs imageio-ffmpeg: pip install 'multimodal-to[video]'") from error
+    times = _frame_times(trajectory, rate)
+    with whole(path) as draft:
+        writer = imageio_ffmpeg.write_frames(
+            str(draft), size, fps=rate, codec="libx264", pix_fmt_in="rgb24", pix_fmt_out="yuv420p", quality=8,
+            macro_block_size=2, output_params=["-movflags", "+faststart"],
+        )  # fmt: skip
+        writer.send(None)
+        try:
+            frame = b""
+            for shot in _film(robot, trajectory, times, size, meshes):
+                frame = Image.open(io.BytesIO(shot)).convert("RGB").tobytes()
+                writer.send(frame)
+            for _ in range(round(HOLD * rate)):
+                writer.send(frame)
+        finally:
+            writer.close()
+    return Path(path)
+
+
+def write_snapshots(
+    robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *,
+    times: Iterable[float] | None = None, size: tuple[int, int] | None = None, meshes: bool = True,
+) -> Path:  # fmt: skip
+    """Write one still picture (PNG) of the robot at several times [s]; `snapshot_times` without any.
+
+    Raises:
+        InputError: a time is not within the trajectory, or times do not increase.
+        OutputError: there is no browser, or the file cannot be written.
+    """
+    instants = snapshot_times(trajectory) if times is None else np.array(list(times), dtype=float)
+    width, height = size or (max(SNAPSHOT_SIZE[0] * instants.size, SNAPSHOT_SIZE[1]), SNAPSHOT_SIZE[1])
+    with tempfile.TemporaryDirectory() as folder, whole(path) as draft:
+        page = Path(folder) / "still.html"
+        write_still_html(robot, trajectory, instants, page, aspect=width / height, meshes=meshes)
+        with open_browser((width, height)) as browser:
+            browser.open(page, "#bare")
+            browser.evaluate("replay.show(0)")
+            draft.write_bytes(browser.picture())
+    return Path(path)
+
+
+def snapshot_times(trajectory: Trajectory) -> Array:
+    """Return five times [s] that tell a motion: start and end, and those where flight begins or ends, or even ones."""
+    start, end = float(trajectory.time[0]), float(trajectory.time[-1])
+    edges = [edge for phase in flight_phases(trajectory) for edge in phase if start < edge < end]
+    if len(edges) != 1:
+        return np.linspace(start, end, 5)
+    (edge,) = edges
+    return np.array([start, (start + edge) / 2, edge, (edge + end) / 2, end])
+
+
+def _frame_times(trajectory: Trajectory, rate: float) -> Array:
+    if not 0.0 < rate <= 100.0:
+        raise InputError(f"the frame rate is {rate:g} a second; expected more than 0 and at most 100")
+    count = int(np.floor(trajectory.duration * rate + 1e-9)) + 1
+    return np.arange(count) / rate
+
+
+def _film(robot: Robot, trajectory: Trajectory, times: Array, size: tuple[int, int], meshes: bool) -> Iterator[bytes]:
+    """Return a picture of the page at each time [s], with its clock and without its buttons."""
+    with tempfile.TemporaryDirectory() as folder:
+        page = write_html(robot, trajectory, Path(folder) / "film.html", meshes=meshes)
+        with open_browser(size) as browser:
+            browser.open(page, "#film&t=0")
+            for instant in times.tolist():
+                browser.evaluate(f"replay.show({instant!r})")
+                yield browser.picture("jpeg")

@@ -1,0 +1,128 @@
+"""What a robot looks like: the visuals of its URDF, or the meshes of another package in which they are dressed."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yourdfpy
+
+from multimodal_to.errors import MultimodalError
+from multimodal_to.replay.dress import Dress, read_dress
+from multimodal_to.replay.meshes import MeshWarning, Part, load_parts, simplified
+from multimodal_to.trajectory import Array
+
+FACES = 110_000
+"""Triangles of all meshes of a robot together; those of heavier robots are thinned out to about as many."""
+
+PLAIN = (0.8, 0.8, 0.82, 1.0)
+"""Colour of a visual without one."""
+
+_NAMED = 3  # so many meshes that cannot be drawn are named in the warning
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Visual:
+    """One shape of a link: a primitive of the URDF, or triangles."""
+
+    link: str
+    name: str
+    transform: Array  # link_H_visual, (4, 4)
+    rgba: tuple[float, ...]
+    primitive: yourdfpy.urdf.Geometry | None = None
+    part: Part | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Appearance:
+    """The visuals of a robot, and whose work the meshes among them are."""
+
+    visuals: tuple[Visual, ...]
+    attribution: str  # empty where none is owed
+
+
+def appearance(urdf: Path, *, meshes: bool = True) -> Appearance:
+    """Return the visuals of a robot's URDF, dressed as the `dress.toml` beside it says if its package is installed.
+
+    Meshes that cannot be drawn are left out and named in one `MeshWarning`. Without `meshes` there are only primitives.
+    """
+    robot = parse(urdf)
+    dress = read_dress(urdf.parent) if meshes else None
+    problems: dict[str, str] = {}
+    palette = {material.name: material for material in robot.materials}
+    found = []
+    for link in robot.links:
+        for index, visual in enumerate(link.visuals):
+            if dress is None or not dress.replaces(link.name, visual.name):
+                found += _shapes(link.name, f"visual_{index}", visual, urdf, palette, problems, meshes)
+    if dress is not None:
+        found += _dressed(dress, robot, problems)
+    _warn(problems)
+    return Appearance(visuals=tuple(_thinned(found)), attribution=dress.attribution if dress else "")
+
+
+def parse(urdf: Path) -> Any:
+    """Return links, joints and materials of a URDF as `yourdfpy` has them; no mesh is looked for."""
+    return yourdfpy.URDF.load(str(urdf), build_scene_graph=False, load_meshes=False).robot
+
+
+def _shapes(
+    link: str, name: str, visual: Any, urdf: Path, palette: Mapping[str, Any], problems: dict[str, str], meshes: bool
+) -> list[Visual]:
+    """Return the shapes of one <visual>: none for a mesh that cannot be drawn."""
+    origin = np.eye(4) if visual.origin is None else visual.origin
+    stated = _stated_colour(visual, palette)
+    mesh = visual.geometry.mesh
+    if mesh is None:
+        return [Visual(link=link, name=name, transform=origin, rgba=stated or PLAIN, primitive=visual.geometry)]
+    if not meshes:
+        return []
+    scale = np.ones(3) if mesh.scale is None else np.broadcast_to(np.asarray(mesh.scale, dtype=float), 3)
+    try:
+        parts = load_parts(mesh.filename, urdf, scale)
+    except MultimodalError as error:
+        problems[mesh.filename] = str(error)
+        return []
+    return [
+        Visual(link=link, name=name if len(parts) == 1 else f"{name}_{index}", transform=origin,
+               rgba=stated or part.rgba or PLAIN, part=part)
+        for index, part in enumerate(parts)
+    ]  # fmt: skip
+
+
+def _stated_colour(visual: Any, palette: Mapping[str, Any]) -> tuple[float, ...] | None:
+    """Return the colour that a URDF gives a visual: its own, or the robot's of that name."""
+    material = visual.material
+    if material is not None and material.color is None:
+        material = palette.get(material.name)
+    return None if material is None or material.color is None else tuple(float(part) for part in material.color.rgba)
+
+
+def _dressed(dress: Dress, robot: Any, problems: dict[str, str]) -> list[Visual]:
+    """Return the meshes of the other model as visuals of this robot's links."""
+    other = parse(dress.urdf)
+    links, palette = {link.name: link for link in other.links}, {entry.name: entry for entry in other.materials}
+    found = []
+    for garment, placement in zip(dress.garments, dress.placements(robot, other), strict=True):
+        for index, visual in enumerate(links[garment.source].visuals):
+            name = f"{garment.source}_mesh_{index}"
+            for shape in _shapes(garment.link, name, visual, dress.urdf, palette, problems, True):
+                colour = garment.rgba or shape.rgba
+                found.append(replace(shape, transform=placement @ shape.transform, rgba=colour))
+    return found
+
+
+def _thinned(visuals: list[Visual]) -> list[Visual]:
+    parts = iter(simplified([visual.part for visual in visuals if visual.part is not None], FACES))
+    return [visual if visual.part is None else replace(visual, part=next(parts)) for visual in visuals]
+
+
+def _warn(problems: Mapping[str, str]) -> None:
+    if problems:
+        named = "; ".join(f"'{uri}': {problem}" for uri, problem in list(problems.items())[:_NAMED])
+        more = f"; and {len(problems) - _NAMED} more" if len(problems) > _NAMED else ""
+        warnings.warn(f"{len(problems)} meshes are not drawn: {named}{more}", MeshWarning, stacklevel=2)

@@ -1,0 +1,113 @@
+"""A report of a motion: one HTML page with replay, figures, audit and scenario, which fetches nothing."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import os
+import platform
+from collections.abc import Iterable, Mapping
+from importlib import metadata, resources
+from pathlib import Path
+from string import Template
+
+from multimodal_to.audit import Audit, audit
+from multimodal_to.findings import Finding
+from multimodal_to.models.robot import Robot
+from multimodal_to.ocp.scenario import Scenario
+from multimodal_to.plotting import FIGURES, plot, plot_margins
+from multimodal_to.replay import player
+from multimodal_to.scenario_files import to_toml
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.writing import write_text
+
+PACKAGES = ("multimodal-to", "casadi", "numpy")
+"""Whose versions the report names."""
+
+_CAPTIONS: Mapping[str, str] = {
+    "forces": "Throttle, thrust and vertical contact force",
+    "com": "Centre of mass",
+    "momentum": "Angular momentum about the centre of mass",
+    "joints": "Joint positions and speeds",
+    "torques": "Joint torques, by inverse dynamics of the planned motion under the planned forces",
+    "contacts": "Contacts",
+    "margins": "Slacks, and the audit against its limits",
+}
+
+
+def write_report(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *, meshes: bool = True) -> Path:
+    """Write the report of a motion as one page that opens from disk; whole or not at all.
+
+    Raises:
+        InputError: the trajectory is for another robot.
+        OutputError: the folder does not exist or cannot be written.
+    """
+    report = audit(robot, trajectory)
+    scenario = report.scenario
+    title = trajectory.scenario if scenario is None else scenario.title
+    template = Template(resources.files("multimodal_to").joinpath("report.html").read_text(encoding="utf-8"))
+    return write_text(path, template.substitute(
+        title=html.escape(f"{title} · {trajectory.robot}"),
+        summary=_summary(report),
+        facts="".join(_row(("th", name), ("td", text)) for name, text in _facts(robot, trajectory, report).items()),
+        player=player(robot, trajectory, meshes=meshes),
+        figures="\n".join(_figure(name, robot, trajectory, report) for name in FIGURES),
+        findings="\n".join(_findings(report.findings)),
+        scenario=_scenario(scenario),
+    ))  # fmt: skip
+
+
+def _summary(report: Audit) -> str:
+    failed = [finding.name for finding in report.findings if not finding.holds]
+    count = len(report.findings)
+    if not failed:
+        return f'<span class="holds">All {count} properties of the audit hold.</span>'
+    return f'<span class="fails">{len(failed)} of {count} properties fail: {html.escape(", ".join(failed))}.</span>'
+
+
+def _facts(robot: Robot, trajectory: Trajectory, report: Audit) -> dict[str, str]:
+    versions = [f"{name} {metadata.version(name)}" for name in PACKAGES]
+    return {
+        "scenario": trajectory.scenario,
+        "robot": f"{robot.name}: {len(robot.joint_names)} joints, {robot.mass:.2f} kg, "
+        f"{len(robot.contacts)} contact points, {len(robot.jets)} jets",
+        "time": f"{report.duration:.2f} s in {trajectory.knots} intervals; longest flight {report.airborne:.2f} s",
+        "thrust at the end": f"{100 * report.final_thrust_over_weight:.2f} % of the weight, vertically",
+        "versions": ", ".join([*versions, f"Python {platform.python_version()}"]),
+    }
+
+
+def _row(*cells: tuple[str, str]) -> str:
+    return "<tr>" + "".join(f"<{tag}>{html.escape(text)}</{tag.split()[0]}>" for tag, text in cells) + "</tr>"
+
+
+def _findings(findings: Iterable[Finding]) -> Iterable[str]:
+    number = 'td class="number"'
+    for finding in findings:
+        verdict = ('td class="holds"', "holds") if finding.holds else ('td class="fails"', "fails")
+        yield _row(
+            ("td", finding.name), (number, f"{finding.worst:.1e}"), (number, f"{finding.limit:.2g}"),
+            ("td", finding.unit), (number, str(finding.knot)), ("td", finding.body), verdict,
+        )  # fmt: skip
+
+
+def _figure(name: str, robot: Robot, trajectory: Trajectory, report: Audit) -> str:
+    figure = plot_margins(robot, trajectory, audits=[report]) if name == "margins" else plot(name, robot, trajectory)
+    figure.suptitle("")  # the caption says it
+    stream = io.BytesIO()
+    figure.savefig(stream, format="svg")
+    width, height = figure.get_size_inches()
+    data = base64.b64encode(stream.getvalue()).decode("ascii")
+    caption = html.escape(_CAPTIONS[name])
+    tall = ' class="tall"' if height > width else ""
+    image = f'<img alt="{caption}" src="data:image/svg+xml;base64,{data}">'
+    return f"<figure{tall}><figcaption>{caption}</figcaption>{image}</figure>"
+
+
+def _scenario(scenario: Scenario | None) -> str:
+    if scenario is None:
+        return (
+            '<h2>Scenario</h2><p class="quiet">The file keeps no scenario: start, end and ranges were not judged.</p>'
+        )
+    return f"<h2>Scenario</h2><pre>{html.escape(to_toml(scenario), quote=False)}</pre>"
