@@ -3,13 +3,14 @@ PYTHON ?= python3
 BIN := .venv/bin
 RESULTS := results/take-off
 
-.PHONY: help setup take-off test lint clean
+.PHONY: help setup take-off test lint docs clean
 
 help:
 	@echo "make take-off   set up, solve the take-off, write $(RESULTS)/{trajectory.npz,forces.png,replay.html}"
 	@echo "make test       set up, check the style and run the tests"
 	@echo "make lint       ruff and mypy --strict"
-	@echo "make clean      remove the environment and the results"
+	@echo "make docs       set up, build the documentation in site/"
+	@echo "make clean      remove the environment, the results and the built documentation"
 
 setup: .venv/ready
 
@@ -24,8 +25,12 @@ lint: .venv/ready-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+docs: .venv/ready-docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+	@echo "open site/index.html"
+
 clean:
-	rm -rf .venv results
+	rm -rf .venv results site
 
 .venv/ready: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -38,4 +43,9 @@ clean:
 .venv/ready-dev: .venv/ready
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
 	$(BIN)/python -m pip install --quiet --group dev
+	touch $@
+
+.venv/ready-docs: .venv/ready
+	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
+	$(BIN)/python -m pip install --quiet --group docs
 	touch $@

@@ -41,10 +41,11 @@ def stopped(tmp_path_factory):
 def test_list_shows_the_scenarios_with_their_numbers():
     result = run("list")
     assert result.returncode == 0
-    assert "CoM from [m]" in result.stdout
-    (line,) = (line for line in result.stdout.splitlines() if line.startswith(" take-off "))
-    for number in ("70", "3.5 to 7", "0 0 0.57", "0 0 0.7", "standing", "hover", "flat"):
-        assert f" {number} " in line + " "
+    assert "take-off  Vertical take-off from standing to hover" in result.stdout
+    assert (
+        "70 knots, 3.5 to 7 s, CoM from 0 0 0.57 m (standing) to 0 0 0.7 m (hover), jets on, ground: flat"
+        in result.stdout
+    )
 
 
 def test_a_scenario_is_shown_as_toml_changed_and_read_back(tmp_path):

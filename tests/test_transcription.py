@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from multimodal_to import scenarios
-from multimodal_to.ocp import Weights, build
+from multimodal_to.models.contact import FrictionCone
+from multimodal_to.models.terrain import HeightField
+from multimodal_to.ocp import Terminal, Weights, build
 from multimodal_to.ocp.variables import Layout
 
 SLACKS = Weights(complementarity_slack=1.0, sliding_slack=1.0)
@@ -65,6 +67,26 @@ def test_the_hessian_is_the_derivative_of_the_gradient_of_the_lagrangian(problem
     expected = (gradient(x + 1e-6 * along) - gradient(x - 1e-6 * along)) / 2e-6
     computed = np.array(hessian @ cs.DM(along)).ravel()
     assert np.abs(computed - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+def test_derivatives_are_exact_on_terrain_and_with_the_second_order_cone(ironcub):
+    """Points are spread over a bumpy field; the Jacobian against the rows, the Hessian against the Jacobian."""
+    field = HeightField.sampled(
+        lambda x, y: 0.1 * np.sin(3 * x + y), x_range=(-0.8, 0.8), y_range=(-0.8, 0.8), spacing=0.3
+    )
+    task = replace(scenarios.landing(), knots=3, terminal=Terminal.FREE, surface=field, weights=SLACKS,
+                   friction_cone=FrictionCone.SECOND_ORDER)  # fmt: skip
+    bumpy, rng = build(ironcub, task), np.random.default_rng(8)
+    x = bumpy.guess + 0.1 * rng.normal(size=bumpy.guess.size)
+    along, multipliers = rng.normal(size=x.size), cs.DM(rng.normal(size=bumpy.row_lower.size))
+    ends = [x - 1e-6 * along, x + 1e-6 * along]
+    before, after = (np.array(bumpy.nlp.rows(end)).ravel() for end in ends)
+    moved = np.array(bumpy.nlp.jacobian(x, 1.0)[1] @ cs.DM(along)).ravel()
+    assert moved == pytest.approx((after - before) / 2e-6, rel=1e-5, abs=1e-4)
+    before, after = (np.array(bumpy.nlp.jacobian(end, 1.0)[1].T @ multipliers).ravel() for end in ends)
+    bent = np.array(cs.triu2symm(bumpy.nlp.hessian(x, 1.0, 0.0, multipliers)) @ cs.DM(along)).ravel()
+    expected = (after - before) / 2e-6
+    assert np.abs(bent - expected).max() < 1e-5 * np.abs(expected).max()
 
 
 def test_derivatives_match_those_of_the_whole_graph(problem, point):

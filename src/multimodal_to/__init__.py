@@ -4,23 +4,30 @@ A `Robot` and a `Scenario` go into `build`; `solve` returns a `Solution` with a 
 `audit`, `multimodal_to.plotting` and `multimodal_to.replay` need only the trajectory and the robot.
 """
 
-from multimodal_to import scenarios
+from multimodal_to import scenario_files, scenarios
 from multimodal_to.adam import KinDynComputations
 from multimodal_to.audit import Audit, audit
 from multimodal_to.errors import MultimodalError
+from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.models.terrain import FlatGround, HeightField, Plane, Stairs
 from multimodal_to.ocp import Ipopt, Problem, Scenario, Solution, Start, Status, Terminal, Weights, build, solve
 from multimodal_to.trajectory import Trajectory
 
 __all__ = [
     "Audit",
+    "FlatGround",
+    "FrictionCone",
+    "HeightField",
     "Ipopt",
     "KinDynComputations",
     "MultimodalError",
+    "Plane",
     "Problem",
     "Robot",
     "Scenario",
     "Solution",
+    "Stairs",
     "Start",
     "Status",
     "Terminal",
@@ -29,6 +36,7 @@ __all__ = [
     "audit",
     "build",
     "load_robot",
+    "scenario_files",
     "scenarios",
     "solve",
 ]

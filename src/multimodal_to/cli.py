@@ -87,20 +87,22 @@ def _options(
 @app.command("list")
 def list_scenarios() -> None:
     """List the bundled scenarios with their numbers."""
-    table = Table("scenario", "what it does", "knots", r"time \[s]", r"CoM from \[m]", r"to \[m]", "starts", "ends",
-                  "jets", "ground", box=None)  # fmt: skip
+    table = Table(Column(no_wrap=True), Column(), box=None, show_header=False, pad_edge=False)
     for make in SCENARIOS.values():
         scenario = make()
-        durations = dict.fromkeys(f"{scenario.knots * dt:g}" for dt in (scenario.interval_min, scenario.interval_max))
-        start, end = (" ".join(f"{number:g}" for number in com) for com in (scenario.initial_com, scenario.final_com))
-        if scenario.mid_height_min is not None:
-            end += f", over {scenario.mid_height_min:g}"
-        table.add_row(
-            scenario.name, scenario.title, str(scenario.knots), " to ".join(durations), start, end,
-            scenario.start.value, scenario.terminal.value, "on" if scenario.jets else "off",
-            to_dict(scenario)["surface"]["kind"],
-        )  # fmt: skip
+        table.add_row(scenario.name, f"{scenario.title}\n{_numbers(scenario)}")
     _out.print(table)
+
+
+def _numbers(scenario: Scenario) -> str:
+    durations = dict.fromkeys(f"{scenario.knots * dt:g}" for dt in (scenario.interval_min, scenario.interval_max))
+    start, end = (" ".join(f"{number:g}" for number in com) for com in (scenario.initial_com, scenario.final_com))
+    middle = "" if scenario.mid_height_min is None else f"above {scenario.mid_height_min:g} m at mid-horizon, "
+    return (
+        f"{scenario.knots} knots, {' to '.join(durations)} s, CoM from {start} m ({scenario.start.value}) to {end} m "
+        f"({scenario.terminal.value}), {middle}jets {'on' if scenario.jets else 'off'}, "
+        f"ground: {to_dict(scenario)['surface']['kind']}"
+    )
 
 
 @app.command()

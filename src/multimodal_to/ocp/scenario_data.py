@@ -50,7 +50,7 @@ def from_dict(table: Mapping[str, Any], base: Scenario | None = None) -> Scenari
         if key in table:
             if com not in table and base is None:
                 raise ScenarioError(f"'{key}' changes '{com}', which the scenario lacks")
-            where = _read(get_type_hints(Scenario)[com], table.get(com) or getattr(base, com), com, None)
+            where = _read(get_type_hints(Scenario)[com], table[com] if com in table else getattr(base, com), com, None)
             table[com] = [*where[:2], _number(table.pop(key), key)]
     scenario: Scenario = _record(Scenario, table, "", base)
     return scenario
