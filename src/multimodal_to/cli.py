@@ -236,7 +236,7 @@ def replay(
     Example: multimodal-to replay results/take-off/trajectory.npz --html take-off.html --gif take-off.gif
     """
     the_robot, trajectory = _load(file, robot)
-    instants = _numbers("--times", times) if times else None
+    instants = _option_numbers("--times", times) if times else None
     wanted = {".html": html, ".png": snapshots, ".gif": gif, ".mp4": mp4}
     targets = {suffix: path for suffix, path in wanted.items() if path is not None}
     for suffix, path in targets.items():
@@ -359,7 +359,7 @@ def audit_file(
     raise typer.Exit(0 if report.holds else 1)
 
 
-def _numbers(option: str, text: str) -> list[float]:
+def _option_numbers(option: str, text: str) -> list[float]:
     try:
         return [float(word) for word in text.split(",")]
     except ValueError as error:
