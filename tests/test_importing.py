@@ -27,9 +27,6 @@ def test_what_bare_arrays_lack_is_computed(ironcub, bare):
     assert imported.contact_positions == pytest.approx(trajectory.contact_positions, abs=1e-12)
     assert imported.time == pytest.approx(trajectory.time)
     assert imported.scenario == "their-motion"
-    heights = imported.per_contact("contact_positions")[:, 2]
-    normal = imported.per_contact("contact_forces")[:, 2]
-    assert imported.complementarity_slack == pytest.approx(np.maximum(heights * normal, 0.0))
 
 
 def test_an_array_that_is_missing_is_named(ironcub, bare):

@@ -31,6 +31,7 @@ OCP_FLOORS = [
     {"scenario"},
     {"scenario_data"},
     {"variables", "integrators"},
+    {"gait"},
     {"constraints", "guess"},
     {"costs", "boundary"},
     {"transcription", "solvers"},

@@ -64,12 +64,12 @@ def test_a_file_without_a_base_takes_the_defaults(tmp_path):
     path = tmp_path / "stand.toml"
     path.write_text(
         'title = "Stand"\nknots = 10\ninitial_com = [0, 0, 0.57]\nfinal_com = [0, 0, 0.57]\nterminal = "standing"\n'
-        "interval_min = 0.1\ninterval_max = 0.1\n[weights]\ncomplementarity_slack = 1\nsliding_slack = 1\n"
+        "interval_min = 0.1\ninterval_max = 0.1\n[weights]\nposture = 1\n"
     )
     stand = scenario_files.load(path)
     assert (stand.name, stand.knots, stand.start, stand.terminal) == ("stand", 10, Start.STANDING, Terminal.STANDING)
     assert stand.surface == FlatGround()
-    assert stand.weights == Weights(complementarity_slack=1.0, sliding_slack=1.0)
+    assert stand.weights == Weights(posture=1.0)
 
 
 def test_single_values_are_changed_by_texts(scenario):

@@ -6,20 +6,20 @@ CoM and angular momentum from its mass-matrix side (J_CMM), not from the recursi
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
 from multimodal_to.audit_task import task_findings
 from multimodal_to.audit_thrust import thrust_findings
-from multimodal_to.derived import flight_phases
-from multimodal_to.errors import InputError
+from multimodal_to.derived import flight_phases, generalised_forces, surface_frames
+from multimodal_to.errors import InputError, unknown
 from multimodal_to.findings import Finding, Motion, largest, worst_of
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
-from multimodal_to.models.terrain import FlatGround, Surface, frame_function
+from multimodal_to.models.terrain import FlatGround
 from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.trajectory import Array, Trajectory
@@ -74,23 +74,32 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
     scenario = scenario or stored(trajectory)
     phases = flight_phases(trajectory)
     motion = Motion.of(robot, trajectory)
+    findings = (
+        *_kinematics(motion),
+        *_dynamics(motion),
+        *_torques(motion),
+        *_integration(motion),
+        *_jets(robot, trajectory),
+        *_contacts(motion, scenario),
+        *_limits(robot, trajectory),
+        *thrust_findings(robot, trajectory),
+        *(task_findings(motion, scenario) if scenario else ()),
+    )
     return Audit(
-        findings=(
-            *_kinematics(motion),
-            *_dynamics(motion),
-            *_torques(motion),
-            *_integration(motion),
-            *_jets(robot, trajectory),
-            *_contacts(motion, scenario),
-            *_limits(robot, trajectory),
-            *thrust_findings(robot, trajectory),
-            *(task_findings(motion, scenario) if scenario else ()),
-        ),
+        findings=_allow(findings, scenario.allowances) if scenario else findings,
         scenario=scenario,
         duration=trajectory.duration,
         airborne=max((end - start for start, end in phases), default=0.0),
         final_thrust_over_weight=float(motion.thrusts[:, -1, 2].sum() / robot.weight),
     )
+
+
+def _allow(findings: Sequence[Finding], allowances: Mapping[str, float]) -> tuple[Finding, ...]:
+    """Widen the limits of the properties that a scenario allows more."""
+    for name in allowances:
+        if name not in {finding.name for finding in findings}:
+            raise InputError(unknown("property to allow more of", name, [finding.name for finding in findings]))
+    return tuple(replace(finding, limit=max(finding.limit, allowances.get(finding.name, 0.0))) for finding in findings)
 
 
 def _kinematics(motion: Motion) -> list[Finding]:
@@ -134,21 +143,8 @@ def _torques(motion: Motion) -> list[Finding]:
     Accelerations are backward differences of the velocities, as the optimiser's backward Euler has them; placeholders
     of effort limits limit nothing.
     """
-    robot, trajectory, count = motion.robot, motion.trajectory, motion.trajectory.time.size
-    velocities = np.vstack([
-        trajectory.base_linear_velocity, trajectory.base_angular_velocity, trajectory.joint_velocities
-    ])  # fmt: skip
-    steps = np.diff(trajectory.time, prepend=trajectory.time[0] - 1.0)
-    accelerations = np.diff(velocities, axis=1, prepend=velocities[:, :1]) / steps
-    frames = (*robot.contact_names, *(jet.frame for jet in robot.jets))
-    forces = [*trajectory.per_contact("contact_forces"), *motion.thrusts.transpose(0, 2, 1)]
-    generalised = np.array(
-        robot.kindyn.rnea_fun(frames).map(count)(
-            np.hstack(list(motion.base)), trajectory.joint_positions, velocities[:6],
-            trajectory.joint_velocities, accelerations[:6], accelerations[6:],
-            *(np.vstack([force, np.zeros((3, count))]) for force in forces),
-        )
-    )  # fmt: skip
+    robot = motion.robot
+    generalised = generalised_forces(robot, motion.trajectory)
     effort = np.where(robot.joint_limits.effort < EFFORT_PLACEHOLDER, robot.joint_limits.effort, np.inf)
     beyond = np.abs(generalised[6:]) - effort[:, None]
     return [
@@ -206,7 +202,7 @@ def _contacts(motion: Motion, scenario: Scenario | None) -> list[Finding]:
     friction = (scenario.friction if scenario else None) or motion.robot.friction
     cone = scenario.friction_cone if scenario else FrictionCone.PYRAMID
     points, forces = motion.points, motion.contact_forces
-    heights, normals, tangents = _frames(surface, points)
+    heights, normals, tangents = surface_frames(surface, points)
     normal = np.einsum("ckx,ckx->ck", normals, forces)
     along = np.einsum("ckxt,ckx->ckt", tangents, forces)
     reached = np.abs(along).max(axis=2) if cone is FrictionCone.PYRAMID else np.linalg.norm(along, axis=2)
@@ -220,13 +216,6 @@ def _contacts(motion: Motion, scenario: Scenario | None) -> list[Finding]:
         worst_of("normal force × height", "N m", 0.01, normal * heights, names),
         worst_of("slip under load", "m", 1e-3, np.where(normal > LOADED, slips, 0.0), names),
     ]
-
-
-def _frames(surface: Surface, points: Array) -> tuple[Array, Array, Array]:
-    """Return d (...), n (..., 3) and t (..., 3, 2) of a surface at points (..., 3)."""
-    shape, count = points.shape[:-1], math.prod(points.shape[:-1])
-    d, n, t = (np.array(part) for part in frame_function(surface).map(count)(points.reshape(count, 3).T))
-    return d.reshape(shape), n.T.reshape(*shape, 3), t.reshape(3, count, 2).transpose(1, 0, 2).reshape(*shape, 3, 2)
 
 
 def _limits(robot: Robot, trajectory: Trajectory) -> list[Finding]:

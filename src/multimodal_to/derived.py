@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import casadi as cs
@@ -11,6 +12,7 @@ from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import homogeneous
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.terrain import Surface, frame_function
 from multimodal_to.trajectory import QUANTITIES, Array, Trajectory
 
 FLIGHT_FORCE = 1.0
@@ -40,6 +42,25 @@ def _stacked(side_by_side: cs.DM) -> Array:
 def contact_points(robot: Robot, trajectory: Trajectory) -> Array:
     """Return the contact points by forward kinematics [m], (contacts, knots + 1, 3)."""
     return np.array([frame_poses(robot, trajectory, name)[:, :3, 3] for name in trajectory.contact_names])
+
+
+def surface_frames(surface: Surface, points: Array) -> tuple[Array, Array, Array]:
+    """Return d (...), n (..., 3) and t (..., 3, 2) of a surface at points (..., 3)."""
+    shape, count = points.shape[:-1], math.prod(points.shape[:-1])
+    d, n, t = (np.array(part) for part in frame_function(surface).map(count)(points.reshape(count, 3).T))
+    return d.reshape(shape), n.T.reshape(*shape, 3), t.reshape(3, count, 2).transpose(1, 0, 2).reshape(*shape, 3, 2)
+
+
+def contact_products(robot: Robot, trajectory: Trajectory, surface: Surface) -> tuple[Array, Array]:
+    """Return what complementarity bounds [N m], (contacts, knots + 1) each: height and slip, times the normal force.
+
+    The slip is that over the interval that ends at the knot, ‖tᵀ Δp‖.
+    """
+    points = contact_points(robot, trajectory)
+    heights, normals, tangents = surface_frames(surface, points)
+    normal = np.einsum("ckx,cxk->ck", normals, trajectory.per_contact("contact_forces"))
+    moves = np.diff(points, axis=1, prepend=points[:, :1])
+    return heights * normal, np.linalg.norm(np.einsum("ckxt,ckx->ckt", tangents, moves), axis=2) * normal
 
 
 def thrust_forces(robot: Robot, trajectory: Trajectory) -> tuple[Array, Array]:

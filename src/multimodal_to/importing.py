@@ -14,7 +14,7 @@ from multimodal_to.errors import TrajectoryError
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import QUANTITIES, Trajectory, read_archive
 
-COMPUTED = ("contact_positions", "complementarity_slack", "sliding_slack")
+COMPUTED = ("contact_positions",)
 """What bare arrays need not hold: it follows from the others."""
 
 
@@ -22,9 +22,8 @@ def import_arrays(robot: Robot, path: str | os.PathLike[str]) -> Trajectory:
     """Read an `.npz` of bare arrays for a robot.
 
     The archive holds `total_time` [s] and every array of `QUANTITIES` but those of `COMPUTED`, each (dim, knots + 1),
-    in the robot's order of joints, contact points and jets. The contact points come from forward kinematics, the slacks
-    from what they bound on flat ground at height zero: height × normal force and slip × normal force. Base velocities
-    at the first knot, which some files leave without meaning, are kept as they are.
+    in the robot's order of joints, contact points and jets. The contact points come from forward kinematics. Base
+    velocities at the first knot, which some files leave without meaning, are kept as they are.
 
     Raises:
         TrajectoryError: the file is missing or broken, or lacks an array.
@@ -44,16 +43,7 @@ def import_arrays(robot: Robot, path: str | os.PathLike[str]) -> Trajectory:
         contact_names=robot.contact_names,
         jet_names=robot.jet_names,
         contact_positions=np.zeros((3 * contacts, count)),
-        complementarity_slack=np.zeros((contacts, count)),
-        sliding_slack=np.zeros((contacts, count)),
         **arrays,
     )
     points = contact_points(robot, bare)
-    normal = bare.per_contact("contact_forces")[:, 2]
-    slips = np.abs(np.diff(points[:, :, :2], axis=1, prepend=points[:, :1, :2])).max(axis=2)
-    return replace(
-        bare,
-        contact_positions=points.transpose(0, 2, 1).reshape(-1, count),
-        complementarity_slack=np.maximum(points[:, :, 2] * normal, 0.0),
-        sliding_slack=slips * np.maximum(normal, 0.0),
-    )
+    return replace(bare, contact_positions=points.transpose(0, 2, 1).reshape(-1, count))

@@ -49,10 +49,6 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         "contact_positions": Quantity(rows=3, of="contact", unit="m", meaning="p_i, contact points in the world"),
         "contact_forces": Quantity(rows=3, of="contact", unit="N", meaning="f_i, on the robot, world axes"),
         "contact_force_rates": Quantity(rows=3, of="contact", unit="N/s", meaning="ḟ_i"),
-        "complementarity_slack": Quantity(
-            rows=1, of="contact", unit="N m", meaning="ε_n, bound of height × normal force"
-        ),
-        "sliding_slack": Quantity(rows=1, of="contact", unit="N m", meaning="ε_t, bound of slip × normal force"),
         "thrust": Quantity(rows=1, of="jet", unit="N", meaning="T"),
         "thrust_rate": Quantity(rows=1, of="jet", unit="N/s", meaning="Ṫ"),
         "thrust_acceleration": Quantity(rows=1, of="jet", unit="N/s²", meaning="T̈"),
@@ -96,8 +92,6 @@ class Trajectory:
     contact_positions: Array
     contact_forces: Array
     contact_force_rates: Array
-    complementarity_slack: Array
-    sliding_slack: Array
     thrust: Array
     thrust_rate: Array
     thrust_acceleration: Array

@@ -52,14 +52,7 @@ def set_boundary(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Pos
 def _set_start(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture) -> None:
     fix = bounds.fix
     fix("com_position", 0, np.array(scenario.initial_com))
-    for name in (
-        *_AT_REST,
-        "com_velocity",
-        "angular_momentum",
-        "complementarity_slack",
-        "sliding_slack",
-        "thrust_rate",
-    ):
+    for name in (*_AT_REST, "com_velocity", "angular_momentum", "thrust_rate"):
         fix(name, 0, 0.0)
     if scenario.start is Start.HOVER:
         fix("base_quaternion_xyzw", 0, _ORIENTATION, within=_UPRIGHT)

@@ -31,6 +31,8 @@ class World:
     surface: Surface
     friction: float
     friction_cone: FrictionCone
+    complementarity_max: float  # ε_n [N m]
+    sliding_max: float  # ε_t [N m]
     standing: Posture  # near home, with the CoM where the motion starts
 
 
@@ -111,10 +113,7 @@ def complementarity(knot: Knot, world: World) -> Rows:
         contact.complementarity(world.surface, point, force)
         for point, force in zip(knot.points, knot.forces, strict=True)
     ]
-    return Rows(
-        expression=cs.vertcat(*products) - knot.complementarity_slack,
-        lower=-np.inf, upper=0.0, unit="N m", scale=1.0,
-    )  # fmt: skip
+    return Rows(expression=cs.vertcat(*products), lower=-np.inf, upper=world.complementarity_max, unit="N m")
 
 
 def contact_reach(knot: Knot, world: World) -> Rows:
@@ -203,12 +202,11 @@ def sliding(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
 
     The force is the one that acts over the interval: under backward Euler its end's.
     """
-    rows = []
-    for index, (before, after, force) in enumerate(zip(start.points, end.points, end.forces, strict=True)):
-        product = contact.sliding(world.surface, after, force, after - before)
-        slack = end.sliding_slack[index]
-        rows += [product - slack, -product - slack]
-    return Rows(expression=cs.vertcat(*rows), lower=-np.inf, upper=0.0, unit="N m", scale=1.0)
+    products = [
+        contact.sliding(world.surface, after, force, after - before)
+        for before, after, force in zip(start.points, end.points, end.forces, strict=True)
+    ]
+    return Rows(expression=cs.vertcat(*products), lower=-world.sliding_max, upper=world.sliding_max, unit="N m")
 
 
 def _thrust_acceleration(knot: Knot, world: World) -> SX:

@@ -1,6 +1,6 @@
 """The costs, one residual function each; its name is the name of its weight and of its share in the report.
 
-A cost is weight × |residual|² (× Δt when running); the slack costs are weight × Σ ε, without Δt.
+A cost is weight × |residual|² (× Δt when running).
 """
 
 from __future__ import annotations
@@ -95,16 +95,6 @@ def throttle(start: Knot, end: Knot, dt: SX, world: World) -> SX:
     return end.throttle
 
 
-def complementarity_slack(start: Knot, end: Knot, dt: SX, world: World) -> SX:
-    """ε_n."""
-    return end.complementarity_slack
-
-
-def sliding_slack(start: Knot, end: Knot, dt: SX, world: World) -> SX:
-    """ε_t."""
-    return end.sliding_slack
-
-
 RUNNING: tuple[Residual, ...] = (
     com_velocity,
     com_acceleration,
@@ -120,5 +110,4 @@ RUNNING: tuple[Residual, ...] = (
     thrust_rate,
     throttle,
 )
-LINEAR: tuple[Residual, ...] = (complementarity_slack, sliding_slack)
 FINAL: tuple[Residual, ...] = (posture, com_velocity, com_acceleration, angular_momentum, angular_momentum_rate)

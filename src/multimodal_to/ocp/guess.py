@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +12,9 @@ from multimodal_to.adam import centroidal, quaternion
 from multimodal_to.adam.kinematics import Pose, forward_kinematics
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Posture, Robot
-from multimodal_to.models.terrain import Surface
-from multimodal_to.ocp.scenario import Scenario, Vector3
+from multimodal_to.models.terrain import Surface, heights_below
+from multimodal_to.ocp.gait import steps
+from multimodal_to.ocp.scenario import Scenario, Start, Terminal, Vector3
 from multimodal_to.ocp.variables import Layout
 
 Array = NDArray[np.float64]
@@ -61,8 +64,9 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
     }
     options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}}
     solver = cs.nlpsol("standing_posture", "ipopt", problem, options)
+    there = com - np.array(robot.kindyn.CoM_position(base_transform(home), home.joint_positions)).ravel()
     result = solver(
-        x0=np.concatenate([home.base_position, np.zeros(3), home.joint_positions]),
+        x0=np.concatenate([home.base_position + there, np.zeros(3), home.joint_positions]),
         lbx=np.concatenate([np.full(3, -np.inf), np.full(3, -tilt_max), limits.lower]),
         ubx=np.concatenate([np.full(3, np.inf), np.full(3, tilt_max), limits.upper]),
         lbg=np.concatenate([com, np.zeros(len(heights))]),
@@ -97,26 +101,56 @@ def base_transform(posture: Posture) -> Array:
     return transform
 
 
-def straight_line(robot: Robot, scenario: Scenario, standing: Posture) -> Array:
+def start_guess(robot: Robot, scenario: Scenario, standing: Posture) -> Array:
     """Return the start guess of every knot, (layout size, N + 1), in the variables' own units.
 
-    The standing posture moves with the CoM on the straight line from start to end (contact points in x and y only),
-    every jet at `guess_thrust`, vertical contact forces at `guess_contact_load`, everything else at zero.
+    The standing posture moves with the CoM on the straight line from start to end. The contact points go along in x and
+    y, or step `guess_steps` times. Contact forces carry the weight; a motion that starts in the air hands it over to
+    them linearly from the thrusts, one that walks into the air the other way round. Everything else is zero.
     """
     layout = Layout.of(robot)
     knots = scenario.knots + 1
     start, end = np.array(scenario.initial_com), np.array(scenario.final_com)
     travelled = (end - start)[:, None] * np.linspace(0.0, 1.0, knots)
-    along_ground = travelled * np.array([[1.0], [1.0], [0.0]])
     guess = np.zeros((layout.size, knots))
     view = layout.read(guess)
     view["com_position"][:] = start[:, None] + travelled
     view["base_position"][:] = standing.base_position[:, None] + travelled
     view["base_quaternion_xyzw"][:] = standing.base_quaternion_xyzw[:, None]
     view["joint_positions"][:] = standing.joint_positions[:, None]
-    points = contact_positions(robot, standing)[:, None]
-    view["contact_positions"][:] = points + np.tile(along_ground, (len(robot.contacts), 1))
-    thrust = np.minimum(scenario.guess_thrust, [jet.thrust_max for jet in robot.jets])
-    view["thrust"][:] = thrust[:, None]
-    view["contact_forces"][2::3] = scenario.guess_contact_load * robot.weight / len(robot.contacts)
+
+    flown = _weight_flown(robot, scenario)
+    _set_jets(robot, scenario, view, flown)
+    feet = [contact.foot for contact in robot.contacts]
+    moved, shares = steps(feet, scenario, travelled) if scenario.guess_steps else _glide(feet, travelled)
+    points = contact_positions(robot, standing).reshape(-1, 3, 1) + moved
+    ground = heights_below(scenario.surface, points.transpose(1, 0, 2).reshape(3, -1)).reshape(-1, knots)
+    points[:, 2] += ground - ground[:, :1]
+    view["contact_positions"][:] = points.reshape(-1, knots)
+    view["contact_forces"][2::3] = robot.weight * (1.0 - flown) * shares
     return guess
+
+
+def _weight_flown(robot: Robot, scenario: Scenario) -> Array:
+    """Return the share of the weight that the thrusts carry at every knot, (N + 1,): rising on a walk into the air."""
+    first = float(scenario.start is Start.HOVER and bool(robot.jets))
+    last = float(scenario.terminal is Terminal.HOVER and bool(robot.jets) and scenario.guess_steps > 0)
+    return np.linspace(first, last, scenario.knots + 1)
+
+
+def _set_jets(robot: Robot, scenario: Scenario, view: dict[str, Array], flown: Array) -> None:
+    """Let all jets push alike, as much as their limits allow."""
+    interval = 0.5 * (scenario.interval_min + scenario.interval_max)
+    for index, jet in enumerate(robot.jets):
+        thrust = np.minimum(flown * robot.weight / len(robot.jets), jet.thrust_max)
+        throttle = [jet.model.steady_throttle(value) for value in thrust]
+        view["thrust"][index] = thrust
+        view["thrust_rate"][index, 1:] = np.diff(thrust) / interval
+        view["throttle"][index] = np.clip(throttle, jet.throttle_min, jet.throttle_max)
+
+
+def _glide(feet: Sequence[str], travelled: Array) -> tuple[Array, Array]:
+    """Return how far each contact point has moved along the ground, (contacts, 3, N + 1), and its share of the load."""
+    along_ground = travelled * np.array([[1.0], [1.0], [0.0]])
+    count = len(feet)
+    return np.tile(along_ground, (count, 1, 1)), np.full((count, travelled.shape[1]), 1.0 / max(count, 1))

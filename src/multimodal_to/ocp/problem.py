@@ -14,7 +14,7 @@ from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Remembered
 from multimodal_to.ocp.boundary import set_boundary
 from multimodal_to.ocp.constraints import World
-from multimodal_to.ocp.guess import standing_posture, straight_line
+from multimodal_to.ocp.guess import standing_posture, start_guess
 from multimodal_to.ocp.scenario import Scenario, Start, Terminal
 from multimodal_to.ocp.stages import NamedStage, collect
 from multimodal_to.ocp.transcription import Nlp, assemble
@@ -44,7 +44,6 @@ class Problem:
     scenario: Scenario
     layout: Layout
     opti: cs.Opti
-    slack_factor: cs.MX  # Opti's parameter: what both slack weights are multiplied by while solving
     nlp: Nlp
     lower: Array  # of x
     upper: Array
@@ -67,9 +66,9 @@ class Problem:
         return report
 
     def costs(self, x: Array) -> dict[str, float]:
-        """Return each named cost's share of the objective at x, with the scenario's own weights."""
+        """Return each named cost's share of the objective at x, in the scenario's weights."""
         report = dict.fromkeys(self.cost_names, 0.0)
-        for name, value in zip(self.cost_names, np.array(self.nlp.costs(x, 1.0)).ravel(), strict=True):
+        for name, value in zip(self.cost_names, np.array(self.nlp.costs(x)).ravel(), strict=True):
             report[name] += float(value)
         return report
 
@@ -95,9 +94,14 @@ def build(robot: Robot, scenario: Scenario) -> Problem:
         robot.group_indices(group)
     layout, bounds, standing = Layout.of(robot), ranges(robot, scenario), _standing(robot, scenario)
     world = World(
-        robot=robot, surface=Remembered(scenario.surface), friction=scenario.friction or robot.friction,
-        friction_cone=scenario.friction_cone, standing=standing,
-    )  # fmt: skip
+        robot=robot,
+        surface=Remembered(scenario.surface),
+        friction=scenario.friction or robot.friction,
+        friction_cone=scenario.friction_cone,
+        complementarity_max=scenario.complementarity_max,
+        sliding_max=scenario.sliding_max,
+        standing=standing,
+    )
     stages = collect(world, scenario, layout, bounds)
     set_boundary(bounds, robot, scenario, standing)
     nlp = assemble([named.stage for named in stages], layout.size, scenario.knots)
@@ -109,14 +113,13 @@ def build(robot: Robot, scenario: Scenario) -> Problem:
     )
     row_lower, row_upper, rows = _row_bounds(stages)
     middle = 0.5 * (scenario.interval_min + scenario.interval_max)
-    guess = np.append(straight_line(robot, scenario, standing).ravel(order="F"), middle) / scale
-    opti, slack_factor = _opti(nlp, lower, upper, row_lower, row_upper)
+    guess = np.append(start_guess(robot, scenario, standing).ravel(order="F"), middle) / scale
+    opti = _opti(nlp, lower, upper, row_lower, row_upper)
     return Problem(
         robot=robot,
         scenario=scenario,
         layout=layout,
         opti=opti,
-        slack_factor=slack_factor,
         nlp=nlp,
         lower=lower,
         upper=upper,
@@ -158,11 +161,11 @@ def _row_bounds(stages: Sequence[NamedStage]) -> tuple[Array, Array, dict[str, R
     return np.concatenate(low), np.concatenate(high), sets
 
 
-def _opti(nlp: Nlp, lower: Array, upper: Array, row_lower: Array, row_upper: Array) -> tuple[cs.Opti, cs.MX]:
-    """Return the `Opti` problem and its parameter; bounds come first, so that they can be told from the rows."""
+def _opti(nlp: Nlp, lower: Array, upper: Array, row_lower: Array, row_upper: Array) -> cs.Opti:
+    """Return the `Opti` problem; bounds come first, so that they can be told from the rows."""
     opti = cs.Opti()
-    x, slack_factor = opti.variable(lower.size), opti.parameter()
+    x = opti.variable(lower.size)
     opti.subject_to(opti.bounded(lower, x, upper))
     opti.subject_to(opti.bounded(row_lower, nlp.rows(x), row_upper))
-    opti.minimize(nlp.objective(x, slack_factor))
-    return opti, slack_factor
+    opti.minimize(nlp.objective(x))
+    return opti

@@ -39,8 +39,8 @@ class Terminal(Enum):
 class Weights:
     """Weight of each cost; a weight of zero adds nothing to the problem.
 
-    Running costs are weight × squared 2-norm × Δt at the end of every interval, those of the slacks weight × sum;
-    `initial_posture` and `final_*` are weight × squared 2-norm at that knot. Only the first kind has Δt.
+    Running costs are weight × squared 2-norm × Δt at the end of every interval; `initial_posture` and `final_*` are
+    weight × squared 2-norm at that knot, without Δt.
     """
 
     com_velocity: float = 0.0  # ẋ [m/s]
@@ -56,8 +56,6 @@ class Weights:
     thrust: float = 0.0  # T [N]
     thrust_rate: float = 0.0  # Ṫ [N/s]
     throttle: float = 0.0  # u [%]
-    complementarity_slack: float  # ε_n [N m], linear
-    sliding_slack: float  # ε_t [N m], linear
     initial_posture: float = 0.0  # s − s̄ at the first knot, where it is found
     final_posture: float = 0.0  # s − the standing posture, at the last knot
     final_com_velocity: float = 0.0
@@ -71,14 +69,7 @@ class Weights:
             for number in value.values() if isinstance(value, Mapping) else (value,):
                 if not (math.isfinite(number) and number >= 0):
                     raise ScenarioError(f"weight '{entry.name}' is {number}; expected a number of at least zero")
-        if not (self.complementarity_slack > 0 and self.sliding_slack > 0):
-            raise ScenarioError("both slacks need a positive weight; without one, forces act in the air and feet slide")
         object.__setattr__(self, "joint_velocities", MappingProxyType(dict(self.joint_velocities)))
-
-    @property
-    def largest_slack(self) -> float:
-        """Return the larger of the two slack weights."""
-        return max(self.complementarity_slack, self.sliding_slack)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,15 +95,16 @@ class Scenario:
     surface: Surface = field(default_factory=FlatGround)
     friction: float | None = None  # None: the robot's own
     friction_cone: FrictionCone = FrictionCone.PYRAMID
-    slack_max: float = 1.0  # bound of both slacks [N m]
-    slack_schedule: tuple[float, ...] = (0.1, 1.0)
-    """What both slack weights are multiplied by in one solve after the other, each from the last one's answer."""
+    complementarity_max: float = 5e-3  # ε_n, greatest height × normal force of a contact point [N m]
+    sliding_max: float = 2e-3  # ε_t, greatest slip over an interval × normal force of a contact point [N m]
     base_speed_max: float = 2.0  # of each component of the base's twist [m/s, rad/s]
     com_range: Vector3 = (1.5, 1.5, 1.5)  # the CoM's greatest distance from the world's origin, by axis [m]
-    guess_thrust: float = 30.0  # of every jet in the start guess [N]
-    guess_contact_load: float = 0.0  # share of the weight that contact forces hold in the start guess [1]
+    allowances: Mapping[str, float] = field(default_factory=dict)
+    """Limits of the audit's properties by name, each in its unit, where they are wider than the audit's own."""
+    guess_steps: int = 0  # how many steps the feet take in the start guess, in turns; 0: they glide along with the CoM
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "allowances", MappingProxyType(dict(self.allowances)))
         self._check_numbers()
         self._check_positions()
         self._check_reach()
@@ -125,14 +117,12 @@ class Scenario:
                 f"interval_min is {self.interval_min} s and interval_max {self.interval_max} s; "
                 "expected 0 < interval_min <= interval_max"
             )
-        for label in ("slack_max", "base_speed_max", "friction"):
+        for label in ("complementarity_max", "sliding_max", "base_speed_max", "friction"):
             value = getattr(self, label)
             if value is not None and not 0 < value < math.inf:
                 raise ScenarioError(f"{label} is {value}; expected a positive number")
-        if not self.slack_schedule or self.slack_schedule[-1] != 1.0 or min(self.slack_schedule) <= 0:
-            raise ScenarioError(f"slack_schedule is {self.slack_schedule}; expected positive numbers that end with 1")
-        if not 0 <= self.guess_thrust < math.inf:
-            raise ScenarioError(f"guess_thrust is {self.guess_thrust} N; expected a number of at least zero")
+        if self.guess_steps < 0:
+            raise ScenarioError(f"guess_steps is {self.guess_steps}; expected a number of at least zero")
 
     def _check_positions(self) -> None:
         for label in ("initial_com", "final_com", "com_range"):

@@ -63,8 +63,8 @@ Progress = Callable[[Iterate], bool]
 def solve(problem: Problem, solver: Ipopt | None = None, progress: Progress | None = None) -> Solution:
     """Solve a problem from its start guess.
 
-    The slack weights rise along the scenario's schedule, one solve starting from the answer of the last: soft contacts
-    first find where the feet leave the ground, hard ones then settle there.
+    A rough phase without the rows' curvature finds a motion that nearly meets the rows; from it the exact one finds
+    the answer.
 
     Args:
         problem: from `build`.
@@ -75,18 +75,17 @@ def solve(problem: Problem, solver: Ipopt | None = None, progress: Progress | No
         SolverError: the solver could not be run.
     """
     solver = solver or Ipopt()
-    softest = problem.scenario.weights.largest_slack * problem.scenario.slack_schedule[0]
     started, iterations, x = time.perf_counter(), 0, problem.guess
-    for index, factor in enumerate(problem.scenario.slack_schedule):
+    for rough in (True, False):
         seconds = max(solver.time_limit - (time.perf_counter() - started), 1e-3)
         left = max(solver.max_iterations - iterations, 1)
-        options = solver.options(softest, left, seconds, warm=index > 0)
+        options = solver.options(left, seconds, rough=rough)
         watcher = None if progress is None else _Watcher(problem, progress, started, iterations)
-        x, statistics = _run(problem, x, factor, options, watcher)
+        x, statistics = _run(problem, x, options, watcher, rough=rough)
         iterations += int(statistics["iter_count"])
         message = str(statistics["return_status"])
         status = Ipopt.status(message)
-        if status in (Status.ITERATION_LIMIT, Status.TIME_LIMIT, Status.STOPPED):
+        if status in (Status.TIME_LIMIT, Status.STOPPED) or iterations >= solver.max_iterations:
             break
     violations, costs = problem.largest_violations(x), problem.costs(x)
     return Solution(
@@ -97,7 +96,7 @@ def solve(problem: Problem, solver: Ipopt | None = None, progress: Progress | No
 
 
 def _run(
-    problem: Problem, x: Array, slack_factor: float, ipopt_options: dict[str, Any], watcher: _Watcher | None
+    problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher | None, *, rough: bool
 ) -> tuple[Array, dict[str, Any]]:
     """Run IPOPT once from x; return where it ended, answer or not, and its statistics."""
     opti = problem.opti
@@ -106,13 +105,12 @@ def _run(
         "detect_simple_bounds": True,
         "jac_g": problem.nlp.jacobian,
         "grad_f": problem.nlp.gradient,
-        "hess_lag": problem.nlp.hessian,
+        "hess_lag": problem.nlp.cost_hessian if rough else problem.nlp.hessian,
     }
     if watcher is not None:
         options["iteration_callback"] = watcher
     opti.solver("ipopt", options, ipopt_options)
     opti.set_initial(opti.x, x)
-    opti.set_value(problem.slack_factor, slack_factor)
     failure: RuntimeError | None = None
     try:
         opti.solve_limited()
@@ -184,7 +182,7 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
     def get_sparsity_in(self, index: int) -> cs.Sparsity:
         variables = self._problem.lower.size
         rows = variables + self._problem.row_lower.size  # Opti counts the bounds among them
-        sizes = {"f": 1, "x": variables, "lam_x": variables, "g": rows, "lam_g": rows, "lam_p": 1}
+        sizes = {"f": 1, "x": variables, "lam_x": variables, "g": rows, "lam_g": rows, "lam_p": 0}
         return cs.Sparsity.dense(sizes.get(cs.nlpsol_out(index), 0), 1)
 
     def eval(self, arguments: list[Any]) -> list[int]:

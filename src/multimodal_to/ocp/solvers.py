@@ -54,12 +54,17 @@ _IPOPT_STATUS = {
 }
 
 
-_WARM_PUSH = 1e-8
+_ROUGH_PUSH = 0.1
+"""How far the start guess is moved inside its bounds, in solver units and as a share of their distance."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ipopt:
-    """IPOPT with MUMPS: a monotone barrier on exact derivatives.
+    """IPOPT with MUMPS: a monotone barrier on exact derivatives, in two phases.
+
+    The rough phase leaves the curvature of the rows out of the Hessian. What is left is convex, so that a step takes
+    one factorisation and is long, and a start guess that meets hardly any row becomes a motion that nearly meets them.
+    The exact phase goes on from there.
 
     Raises:
         InputError: an option is out of its range.
@@ -69,40 +74,41 @@ class Ipopt:
     violation_tolerance: float = 1e-7  # on the rows, in solver units
     max_iterations: int = 1000
     time_limit: float = math.inf  # wall time [s]
-    slack_cost: float = 7.5
-    """What 1 N m of slack costs in the solver's eyes in the first solve of a schedule: the scale of the objective.
+    rough_iterations: int = 20
+    objective_scale: float = 1e-4
+    """What the objective is multiplied by: it brings weights of 1e4 to 1e7, as the paper has them, near one.
 
-    With an objective that weighs more, the barrier gives way to it and feasibility takes hundreds of iterations.
+    An objective that weighs more keeps the steps short until the rows are met; one that weighs less leaves the contacts
+    where the start guess has them.
     """
     barrier_start: float = 0.1
-    barrier_restart: float = 1e-4  # where a solve that starts from the last one's answer begins
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             if not getattr(self, name) > 0:
                 raise InputError(f"{name} is {getattr(self, name)}; expected a positive number")
 
-    def options(self, slack_weight: float, iterations: int, seconds: float, *, warm: bool) -> dict[str, Any]:
-        """Return IPOPT's own options for a solve within a budget; a warm one starts from an answer."""
+    def options(self, iterations: int, seconds: float, *, rough: bool) -> dict[str, Any]:
+        """Return IPOPT's own options for a phase within a budget."""
         options: dict[str, Any] = {
             "print_level": 0,
             "sb": "yes",
             "linear_solver": "mumps",
             "mumps_pivtol": 1e-8,
             "mu_strategy": "monotone",
-            "mu_init": self.barrier_restart if warm else self.barrier_start,
+            "mu_init": self.barrier_start,
             "tol": self.tolerance,
             "constr_viol_tol": self.violation_tolerance,
             "compl_inf_tol": 1.0,  # in units of the cost, whose size is a million
-            "max_iter": iterations,
+            "max_iter": min(iterations, self.rough_iterations) if rough else iterations,
             "nlp_scaling_method": "none",  # rows and variables come with their scales
-            "obj_scaling_factor": self.slack_cost / slack_weight,
+            "obj_scaling_factor": self.objective_scale,
             "honor_original_bounds": "yes",
         }
         if math.isfinite(seconds):
             options["max_wall_time"] = seconds
-        if warm:  # an answer touches its bounds; don't push it away from them
-            options |= dict.fromkeys(("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"), _WARM_PUSH)
+        if rough:
+            options |= dict.fromkeys(("bound_push", "bound_frac"), _ROUGH_PUSH)
         return options
 
     @staticmethod

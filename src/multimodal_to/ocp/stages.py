@@ -57,7 +57,6 @@ class NamedStage:
 def collect(world: World, scenario: Scenario, layout: Layout, bounds: Bounds) -> list[NamedStage]:
     """Return the stages of a scenario; rows of a single variable go into `bounds` instead."""
     z, z_next, dt = cs.SX.sym("z", layout.size), cs.SX.sym("z_next", layout.size), cs.SX.sym("dt")
-    slack_factor = cs.SX.sym("slack_factor")
     start, end = (Knot(world.robot, **layout.read(values * layout.scale)) for values in (z, z_next))
     interval = dt * INTERVAL_SCALE
     first, every, last = np.array([0]), np.arange(scenario.knots), np.array([scenario.knots - 1])
@@ -71,7 +70,7 @@ def collect(world: World, scenario: Scenario, layout: Layout, bounds: Bounds) ->
         "every": _move_to_bounds(at_knots, z_next, layout, bounds, every + 1) + over_intervals,
         "last": _move_to_bounds(at_end, z_next, layout, bounds, last + 1),
     }
-    charged = _costs(start, end, interval, world, scenario.weights, slack_factor)
+    charged = _costs(start, end, interval, world, scenario.weights)
     return [
         NamedStage(
             stage=Stage(
@@ -80,7 +79,6 @@ def collect(world: World, scenario: Scenario, layout: Layout, bounds: Bounds) ->
                 start=z,
                 end=z_next,
                 interval=dt,
-                parameter=slack_factor,
                 rows=cs.vertcat(cs.SX(0, 1), *(some.expression / some.scale for _, some in rows[name])),
                 costs=cs.vertcat(cs.SX(0, 1), *charged[name].values()),
             ),
@@ -126,19 +124,13 @@ def _tighten(bounds: Bounds, layout: Layout, column: int, lower: float, upper: f
     bounds.upper[name][row, knots] = np.minimum(bounds.upper[name][row, knots], upper * scale)
 
 
-def _costs(
-    start: Knot, end: Knot, dt: SX, world: World, weights: Weights, slack_factor: SX
-) -> dict[str, dict[str, SX]]:
+def _costs(start: Knot, end: Knot, dt: SX, world: World, weights: Weights) -> dict[str, dict[str, SX]]:
     """Return the weighted costs by stage and name; those of zero weight are left out."""
     every: dict[str, SX] = {}
     for residual in costs.RUNNING:
         weight = _weight(residual.__name__, world.robot, weights)
         if np.any(weight):
             every[residual.__name__] = _weighted_square(weight, residual(start, end, dt, world)) * dt
-    for residual in costs.LINEAR:
-        weight = _weight(residual.__name__, world.robot, weights)
-        if np.any(weight):
-            every[residual.__name__] = slack_factor * weight * cs.sum1(residual(start, end, dt, world))
     last: dict[str, SX] = {}
     for residual in costs.FINAL:
         name = f"final_{residual.__name__}"

@@ -21,14 +21,13 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage:
-    """Rows and costs of the intervals that start at `starts`, in (z_k, z_k+1, Δt) in solver units and a parameter."""
+    """Rows and costs of the intervals that start at `starts`, in (z_k, z_k+1, Δt) in solver units."""
 
     name: str
     starts: Integers  # k of each interval
     start: SX  # z_k, (size, 1)
     end: SX  # z_k+1, (size, 1)
     interval: SX  # Δt, (1, 1)
-    parameter: SX  # (1, 1), a number that may change from solve to solve; it is in the costs only
     rows: SX  # (m, 1), scaled
     costs: SX  # (c, 1), one per name, weighted
 
@@ -49,34 +48,40 @@ class Stage:
         ])  # fmt: skip
 
     def row_function(self) -> cs.Function:
-        """Return (z, z⁺, Δt, p) → rows."""
+        """Return (z, z⁺, Δt) → rows."""
         return self._function("rows", self.rows)
 
     def cost_function(self) -> cs.Function:
-        """Return (z, z⁺, Δt, p) → costs by name."""
+        """Return (z, z⁺, Δt) → costs by name."""
         return self._function("costs", self.costs)
 
     def jacobian(self) -> tuple[cs.Function, cs.Sparsity]:
-        """Return (z, z⁺, Δt, p) → nonzeros of ∂rows/∂(z, z⁺, Δt), and their places."""
+        """Return (z, z⁺, Δt) → nonzeros of ∂rows/∂(z, z⁺, Δt), and their places."""
         return self._nonzeros("jacobian", cs.jacobian(self.rows, self._arguments))
 
     def gradient(self) -> tuple[cs.Function, cs.Sparsity]:
-        """Return (z, z⁺, Δt, p) → nonzeros of the gradient of all costs, and their places."""
+        """Return (z, z⁺, Δt) → nonzeros of the gradient of all costs, and their places."""
         return self._nonzeros("gradient", cs.sparsify(cs.gradient(cs.sum1(self.costs), self._arguments)))
 
     def hessian(self) -> tuple[cs.Function, cs.Sparsity]:
-        """Return (z, z⁺, Δt, p, σ, λ) → nonzeros of the upper Hessian of σ Σ costs + λᵀ rows, and their places."""
+        """Return (z, z⁺, Δt, σ, λ) → nonzeros of the upper Hessian of σ Σ costs + λᵀ rows, and their places."""
         sigma, multipliers = cs.SX.sym("sigma"), cs.SX.sym("lambda", self.rows.shape[0])
         lagrangian = sigma * cs.sum1(self.costs) + cs.dot(multipliers, self.rows)
         upper = cs.triu(cs.hessian(lagrangian, self._arguments)[0])
         return self._nonzeros("hessian", upper, sigma, multipliers)
+
+    def cost_hessian(self) -> tuple[cs.Function, cs.Sparsity]:
+        """Return (z, z⁺, Δt, σ) → nonzeros of the upper Hessian of σ Σ costs alone, and their places."""
+        sigma = cs.SX.sym("sigma")
+        upper = cs.triu(cs.hessian(sigma * cs.sum1(self.costs), self._arguments)[0])
+        return self._nonzeros("cost_hessian", upper, sigma)
 
     def _nonzeros(self, kind: str, matrix: SX, *more: SX) -> tuple[cs.Function, cs.Sparsity]:
         values = cs.vertcat(*matrix.nonzeros()) if matrix.nnz() else cs.SX(0, 1)
         return self._function(kind, values, *more), matrix.sparsity()
 
     def _function(self, kind: str, output: SX, *more: SX) -> cs.Function:
-        arguments = [self.start, self.end, self.interval, self.parameter, *more]
+        arguments = [self.start, self.end, self.interval, *more]
         return cs.Function(f"{self.name}_{kind}", arguments, [cs.cse(output)])
 
 
@@ -85,11 +90,12 @@ class Nlp:
     """Functions of all variables x = (vec Z, Δt) for CasADi's `nlpsol`, in its names and signatures."""
 
     rows: cs.Function  # x → g
-    costs: cs.Function  # (x, p) → costs by stage and name, stacked
-    objective: cs.Function  # (x, p) → f
-    gradient: cs.Function  # grad_f: (x, p) → f, ∇f
+    costs: cs.Function  # x → costs by stage and name, stacked
+    objective: cs.Function  # x → f
+    gradient: cs.Function  # grad_f: (x, p) → f, ∇f, with an empty p
     jacobian: cs.Function  # jac_g: (x, p) → g, ∂g/∂x
     hessian: cs.Function  # hess_lag: (x, p, λ_f, λ_g) → upper Hessian of the Lagrangian
+    cost_hessian: cs.Function  # the same without the curvature of the rows
 
 
 def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
@@ -98,12 +104,12 @@ def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
     Rows are ordered by stage, then interval, then row.
     """
     count = size * (knots + 1) + 1
-    x, p = cs.MX.sym("x", count), cs.MX.sym("p")
+    x, p = cs.MX.sym("x", count), cs.MX.sym("p", 0)
     factor, multipliers = cs.MX.sym("lam_f"), cs.MX.sym("lam_g", sum(s.rows.shape[0] * s.repeats for s in stages))
-    inputs = [_gather(stage, x, p, size, knots) for stage in stages]
+    inputs = [_gather(stage, x, size, knots) for stage in stages]
 
     rows, costs = [], []
-    gradients, jacobians, hessians = _Blocks(), _Blocks(), _Blocks()
+    gradients, jacobians, hessians, cost_hessians = _Blocks(), _Blocks(), _Blocks(), _Blocks()
     first_row = 0
     for stage, arguments in zip(stages, inputs, strict=True):
         places = stage.positions(size, count - 1)
@@ -123,32 +129,39 @@ def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
         row, column = pattern.get_triplet()
         sigmas = cs.repmat(factor, 1, stage.repeats)
         hessians.add(function.map(stage.repeats)(*arguments, sigmas, own), places[row], places[column])
+        function, pattern = stage.cost_hessian()
+        row, column = pattern.get_triplet()
+        cost_hessians.add(function.map(stage.repeats)(*arguments, sigmas), places[row], places[column])
 
     all_rows, all_costs = cs.vertcat(*rows), cs.vertcat(*costs)
     objective = cs.sum1(all_costs)
     return Nlp(
-        rows=cs.Function("rows", [x], [cs.substitute(all_rows, p, 0)]),
-        costs=cs.Function("costs", [x, p], [all_costs]),
-        objective=cs.Function("objective", [x, p], [objective]),
+        rows=cs.Function("rows", [x], [all_rows]),
+        costs=cs.Function("costs", [x], [all_costs]),
+        objective=cs.Function("objective", [x], [objective]),
         gradient=cs.Function(
             "nlp_grad_f", [x, p], [objective, cs.densify(gradients.matrix(count, 1))], ["x", "p"], ["f", "grad_f_x"]
         ),
         jacobian=cs.Function(
             "nlp_jac_g", [x, p], [all_rows, jacobians.matrix(first_row, count)], ["x", "p"], ["g", "jac_g_x"]
         ),
-        hessian=cs.Function(
-            "nlp_hess_l", [x, p, factor, multipliers], [hessians.matrix(count, count)],
-            ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"],
-        ),
+        hessian=_hessian(x, p, factor, multipliers, hessians.matrix(count, count)),
+        cost_hessian=_hessian(x, p, factor, multipliers, cost_hessians.matrix(count, count)),
     )  # fmt: skip
 
 
-def _gather(stage: Stage, x: cs.MX, p: cs.MX, size: int, knots: int) -> tuple[cs.MX, cs.MX, cs.MX, cs.MX]:
+def _hessian(x: cs.MX, p: cs.MX, factor: cs.MX, multipliers: cs.MX, matrix: cs.MX) -> cs.Function:
+    return cs.Function(
+        "nlp_hess_l", [x, p, factor, multipliers], [matrix], ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]
+    )
+
+
+def _gather(stage: Stage, x: cs.MX, size: int, knots: int) -> tuple[cs.MX, cs.MX, cs.MX]:
     """Return the stage's arguments, one column per interval."""
     variables = cs.reshape(x[:-1], size, knots + 1)
     starts = stage.starts.tolist()
     ends = (stage.starts + 1).tolist()
-    return variables[:, starts], variables[:, ends], *(cs.repmat(one, 1, stage.repeats) for one in (x[-1], p))
+    return variables[:, starts], variables[:, ends], cs.repmat(x[-1], 1, stage.repeats)
 
 
 class _Blocks:

@@ -32,8 +32,6 @@ SCALES = {
     "joint_velocities": 1.0,
     "contact_positions": 1.0,
     "contact_forces": 50.0,
-    "complementarity_slack": 0.1,
-    "sliding_slack": 0.1,
     "thrust": 100.0,
     "thrust_rate": 50.0,
     "throttle": 50.0,
@@ -97,8 +95,6 @@ class Knot:
     joint_velocities: SX
     contact_positions: SX
     contact_forces: SX
-    complementarity_slack: SX
-    sliding_slack: SX
     thrust: SX
     thrust_rate: SX
     throttle: SX
@@ -157,7 +153,7 @@ class Bounds:
 def ranges(robot: Robot, scenario: Scenario) -> Bounds:
     """Return the box constraints that hold at every knot: limits of the robot, and of the scenario (eq. 28, 29)."""
     limits, jets, count = robot.joint_limits, robot.jets, scenario.knots + 1
-    speed, slack = scenario.base_speed_max, scenario.slack_max
+    speed = scenario.base_speed_max
     reach = np.array(scenario.com_range)
     box: dict[str, tuple[Any, Any]] = {
         "com_position": (-reach, reach),
@@ -166,8 +162,6 @@ def ranges(robot: Robot, scenario: Scenario) -> Bounds:
         "base_angular_velocity": (-speed, speed),
         "joint_positions": (limits.lower, limits.upper),
         "joint_velocities": (-limits.speed, limits.speed),
-        "complementarity_slack": (0.0, slack),
-        "sliding_slack": (0.0, slack),
         "thrust": (0.0, np.array([jet.thrust_max for jet in jets])),
         "throttle": (np.array([jet.throttle_min for jet in jets]), np.array([jet.throttle_max for jet in jets])),
     }

@@ -1,4 +1,4 @@
-"""How far a motion is from what it must not exceed: the slacks over time, and the audit's findings by name."""
+"""How far a motion is from what it must not exceed: complementarity over time, and the audit's findings by name."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from multimodal_to.audit import Audit, audit
+from multimodal_to.derived import contact_products
 from multimodal_to.findings import Finding
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.terrain import FlatGround
+from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.plotting.style import (
     COLOURS,
     LIMIT,
@@ -23,14 +26,14 @@ from multimodal_to.plotting.style import (
 )  # fmt: skip
 from multimodal_to.trajectory import Trajectory
 
-_FLOOR, _SLACK_FLOOR = 1e-6, 1e-8  # of what is drawn on the logarithmic axes
+_FLOOR, _PRODUCT_FLOOR = 1e-6, 1e-8  # of what is drawn on the logarithmic axes
 _FAILED = "#d62728"
 
 
 def plot_margins(
     robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None, audits: Sequence[Audit] | None = None
 ) -> Figure:
-    """Plot the largest of each slack over time [N m], and the worst of each property of the audit over its limit [1].
+    """Plot the largest height × force and slip × force over time [N m], and the audit's worst over their limits [1].
 
     Both axes are logarithmic and end at 1e-8 and 1e-6; a property that has nothing to show, as a penetration of less
     than zero, has no bar. A bar that passes 1 fails. `audits` are those to show; by default each run is audited.
@@ -41,25 +44,27 @@ def plot_margins(
     runs = runs_of(robot, trajectories, labels)
     reports = list(audits) if audits is not None else [audit(run.robot, run.trajectory) for run in runs]
     count = len(_properties(reports))
-    figure = new_figure(runs, "slacks and audit", (8.0, 3.6 + count * (0.19 + 0.06 * (len(runs) - 1))))
-    slacks, properties = figure.subplots(2, 1, height_ratios=[2.2, count * 0.19])
-    _draw_slacks(slacks, runs)
+    figure = new_figure(runs, "complementarity and audit", (8.0, 3.6 + count * (0.19 + 0.06 * (len(runs) - 1))))
+    products, properties = figure.subplots(2, 1, height_ratios=[2.2, count * 0.19])
+    _draw_products(products, runs)
     _draw_findings(properties, runs, reports)
     return figure
 
 
-def _draw_slacks(axes: Axes, runs: Sequence[Run]) -> None:
+def _draw_products(axes: Axes, runs: Sequence[Run]) -> None:
     for number, run in enumerate(runs):
-        for name, colour, label in (
-            ("complementarity_slack", COLOURS[0], "complementarity, ε_n"), ("sliding_slack", COLOURS[1], "sliding, ε_t")
-        ):  # fmt: skip
-            largest = getattr(run.trajectory, name).max(axis=0, initial=0.0)
+        scenario = stored(run.trajectory)
+        surface = scenario.surface if scenario else FlatGround()
+        products = contact_products(run.robot, run.trajectory, surface)
+        labels = ("height × normal force", "slip × normal force")
+        for product, colour, label in zip(products, COLOURS, labels, strict=False):
+            largest = product.max(axis=0, initial=0.0)
             axes.semilogy(
-                run.time, np.maximum(largest, _SLACK_FLOOR), color=colour, linestyle=run.style,
+                run.time, np.maximum(largest, _PRODUCT_FLOOR), color=colour, linestyle=run.style,
                 label=label if number == 0 else None,
             )  # fmt: skip
-    axes.set_ylim(_SLACK_FLOOR, max(1e-3, 3.0 * axes.get_ylim()[1]))
-    axes.set_ylabel("largest slack [N m]")
+    axes.set_ylim(_PRODUCT_FLOOR, max(1e-3, 3.0 * axes.get_ylim()[1]))
+    axes.set_ylabel("largest product [N m]")
     axes.set_xlabel("time [s]")
     axes.margins(x=0.0)
     axes.grid(alpha=0.3)

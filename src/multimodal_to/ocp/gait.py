@@ -1,0 +1,48 @@
+"""Footsteps for the start guess: the feet go one after the other, each under its share of the load while it stands.
+
+Only a guess: nothing asks the answer to step when, where or how often it does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from multimodal_to.ocp.scenario import Scenario, Terminal
+
+Array = NDArray[np.float64]
+
+SWING = 0.65  # share of a step's time in which its foot is in the air [1]
+LIFT = 0.04  # height of a swing [m]
+GROUNDED = 0.8  # share of the horizon before a motion that ends in the air leaves the ground [1]
+
+
+def steps(feet: Sequence[str], scenario: Scenario, travelled: Array) -> tuple[Array, Array]:
+    """Return how far each contact point has moved [m], (contacts, 3, N + 1), and its share of the load.
+
+    Args:
+        feet: the foot of each contact point.
+        scenario: its `guess_steps` are spread evenly over the time on the ground, feet taking turns.
+        travelled: how far the CoM has moved at every knot [m], (3, N + 1).
+    """
+    names = list(dict.fromkeys(feet))
+    foot_of = np.array([names.index(foot) for foot in feet])
+    count = scenario.knots + 1
+    leaves = round(GROUNDED * scenario.knots) if scenario.terminal is Terminal.HOVER else scenario.knots
+    moved, stands = np.zeros((len(names), 3, count)), np.ones((len(names), count), dtype=bool)
+    window = leaves / scenario.guess_steps
+    for step in range(scenario.guess_steps):
+        foot, end = step % len(names), round((step + 1) * window)
+        begin = max(round((step + 1 - SWING) * window), 1)
+        stride = travelled[:, leaves] * [1, 1, 0] * (step + 1) / scenario.guess_steps - moved[foot, :, begin]
+        phase = np.arange(1, end - begin + 1) / (end - begin + 1)
+        moved[foot, :, begin:end] += stride[:, None] * phase
+        moved[foot, 2, begin:end] += LIFT * np.sin(np.pi * phase)
+        moved[foot, :, end:] += stride[:, None]
+        stands[foot, begin:end] = False
+    moved[:, :, leaves:] += travelled[:, leaves:] - travelled[:, [leaves]]
+    stands[:, leaves + 1 :] = False
+    shares = stands / np.maximum(stands.sum(axis=0), 1)
+    return moved[foot_of], shares[foot_of] / np.bincount(foot_of)[foot_of, None]
