@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from multimodal_to.derived import base_poses, resample
+from multimodal_to.derived import base_poses
 from multimodal_to.errors import InputError
+from multimodal_to.resampling import resample
 from synthetic import DURATION, take_off
 
 

@@ -14,6 +14,7 @@ FLOORS = [
     {"errors"},
     {"writing"},
     {"trajectory"},
+    {"resampling"},
     {"adam"},
     {"models"},
     {"ocp"},

@@ -132,6 +132,9 @@ def solve(
     robot: RobotOption = "ironcub",
     max_iterations: Annotated[int, typer.Option(help="Give up after so many iterations.")] = 1000,
     time_limit: Annotated[float, typer.Option(help="Give up after so many seconds in the solver.")] = 3600.0,
+    warm_start: Annotated[
+        Path | None, typer.Option(help="Trajectory of a task much like this one to start from, for a faster answer.")
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Solve a scenario; write the trajectory, its plot and its replay page.
@@ -140,6 +143,7 @@ def solve(
     """
     scenario = _scenario(name, settings)
     solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit)
+    start = None if warm_start is None else Trajectory.load(warm_start)
     folder = _writable(output or Path("results") / scenario.name)
     console = Console(highlight=False, quiet=quiet)
     started = time.perf_counter()
@@ -151,7 +155,7 @@ def solve(
         soft_wrap=True,
     )
     with _Progress(console) as progress:
-        solution = run_solver(problem, solver, progress)
+        solution = run_solver(problem, solver, progress, start=start)
     report = audit(the_robot, solution.trajectory, scenario)
     _summarise(console, solution, report)
 
