@@ -83,15 +83,14 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         *(task_findings(motion, scenario) if scenario else ()),
     )
     allowed = _allow(findings, scenario.allowances) if scenario else findings
+    used = [own.name for own, wide in zip(findings, allowed, strict=True) if wide.holds and not own.holds]
     return Audit(
         findings=allowed,
         scenario=scenario,
         duration=trajectory.duration,
         airborne=max((end - start for start, end in phases), default=0.0),
         final_thrust_over_weight=float(motion.thrusts[:, -1, 2].sum() / robot.weight),
-        allowances_used=tuple(
-            own.name for own, wide in zip(findings, allowed, strict=True) if wide.holds and not own.holds
-        ),
+        allowances_used=tuple(used),
     )
 
 

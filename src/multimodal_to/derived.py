@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 
@@ -112,11 +113,9 @@ def footsteps(robot: Robot, trajectory: Trajectory, surface: Surface) -> list[Fo
         members = [index for index, contact in enumerate(robot.contacts) if contact.foot == foot]
         lowest, middle = heights[members].min(axis=0), points[members].mean(axis=0)[:, :2]
         stands = np.flatnonzero(loaded[members].any(axis=0))
-        for before, after in zip(stands[:-1], stands[1:], strict=True):
-            length, lift = (
-                float(np.linalg.norm(middle[after] - middle[before])),
-                float(lowest[before : after + 1].max()),
-            )
+        for before, after in itertools.pairwise(stands):
+            length = float(np.linalg.norm(middle[after] - middle[before]))
+            lift = float(lowest[before : after + 1].max())
             if length >= STEP_LENGTH and lift >= STEP_LIFT:
                 start, end = float(trajectory.time[before]), float(trajectory.time[after])
                 steps.append(Footstep(foot=foot, lift_off=start, touch_down=end, length=length, lift=lift))
