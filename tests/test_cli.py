@@ -41,7 +41,7 @@ def stopped(tmp_path_factory):
 def test_list_shows_the_scenarios_with_their_numbers():
     result = run("list")
     assert result.returncode == 0
-    assert "take-off  Vertical take-off from standing to hover" in result.stdout
+    assert re.search(r"^take-off +Vertical take-off from standing to hover", result.stdout, re.MULTILINE)
     assert (
         "70 knots, 3.5 to 7 s, CoM from 0 0 0.57 m (standing) to 0 0 0.7 m (hover), jets on, ground: flat"
         in result.stdout

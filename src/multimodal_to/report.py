@@ -32,7 +32,7 @@ _CAPTIONS: Mapping[str, str] = {
     "joints": "Joint positions and speeds",
     "torques": "Joint torques, by inverse dynamics of the planned motion under the planned forces",
     "contacts": "Contacts",
-    "margins": "Slacks, and the audit against its limits",
+    "margins": "Height × force and slip × force, and the audit against its limits",
 }
 
 
