@@ -74,8 +74,12 @@ SOLVES = (
 """How the solve went and what motion came out."""
 
 AUDITS = (
-    _worst("force × height [N m]", "normal force × height", ".3f", lambda paper: _number(paper.force_height, ".3f")),
-    _worst("slip under load [m]", "slip under load", ".0e", lambda paper: _number(paper.slip, ".0e")),
+    _worst("force × height [N m]", "normal force × height", ".4f", lambda paper: _number(paper.force_height, ".3f")),
+    Column(
+        title="slip under load [mm]",
+        of_run=lambda run: f"{1e3 * run.report['slip under load'].worst:.2f}",
+        of_published=lambda paper: UNKNOWN if paper.slip is None else f"{1e3 * paper.slip:.1f}",
+    ),
     _worst("penetration [m]", "penetration", ".0e"),
     _worst("CoM [m]", "CoM consistency", ".0e"),
     _worst("momentum [kg m²/s]", "momentum consistency", ".0e"),
