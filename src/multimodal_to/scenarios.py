@@ -22,6 +22,7 @@ def take_off() -> Scenario:
         terminal=Terminal.HOVER,
         interval_min=0.05,
         interval_max=0.10,
+        sliding_max=5e-4,  # the feet stand for some fifty knots, over which slips add up
         weights=Weights(
             com_acceleration=1e5,
             com_velocity=1e7,
@@ -52,6 +53,7 @@ def landing() -> Scenario:
         terminal=Terminal.STANDING,
         interval_min=0.10,
         interval_max=0.10,
+        sliding_max=5e-4,
         weights=replace(take_off().weights, contact_forces=1.0, thrust=5.0, initial_posture=1e6, final_posture=1e6),
     )
 
@@ -154,6 +156,7 @@ def step_up() -> Scenario:
         title="Flying up onto a step",
         initial_com=(0.0, 0.0, 0.72),
         final_com=(-0.4, 0.0, 0.67),
+        sliding_max=2e-3,
         surface=Stairs(edges=(0.2,), heights=(0.0, 0.1), direction=(-1.0, 0.0), width=0.06),
     )
 

@@ -96,7 +96,7 @@ class Scenario:
     friction: float | None = None  # None: the robot's own
     friction_cone: FrictionCone = FrictionCone.PYRAMID
     complementarity_max: float = 5e-3  # ε_n, greatest height × normal force of a contact point [N m]
-    sliding_max: float = 5e-4  # ε_t, greatest slip over an interval × normal force of a contact point [N m]
+    sliding_max: float = 2e-3  # ε_t, greatest slip over an interval × normal force of a contact point [N m]
     base_speed_max: float = 2.0  # of each component of the base's twist [m/s, rad/s]
     com_range: Vector3 = (1.5, 1.5, 1.5)  # the CoM's greatest distance from the world's origin, by axis [m]
     allowances: Mapping[str, float] = field(default_factory=dict)
