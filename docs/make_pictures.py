@@ -1,24 +1,33 @@
-"""Draw the pictures of the README from what `make take-off` wrote: python docs/make_pictures.py.
+"""Draw the pictures of the README and set its table of results: python docs/make_pictures.py.
 
-Needs Chromium (`apt-get install chromium`), which takes the snapshots, and icub-models (`pip install '.[meshes]'`).
+Both come from what `multimodal-to reproduce` wrote to results/; the table is also that of docs/scenarios.md. Needs
+Chromium (`apt-get install chromium`), which takes the snapshots, and icub-models (`pip install '.[meshes]'`).
 """
 
 from pathlib import Path
 
 import multimodal_to as mt
-from multimodal_to.plotting import plot_forces
+from multimodal_to.plotting import plot_forces, save
 from multimodal_to.replay import write_snapshots
 
 ROOT = Path(__file__).parents[1]
-RESULTS = ROOT / "results" / "take-off"
+RESULTS = ROOT / "results"
+BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
 
 
 def main() -> None:
-    """Write docs/take-off.png and docs/take-off-forces.png."""
-    trajectory = mt.Trajectory.load(RESULTS / "trajectory.npz")
-    robot = mt.load_robot(trajectory.robot)
-    write_snapshots(robot, trajectory, ROOT / "docs" / "take-off.png")
-    plot_forces(robot, trajectory).savefig(ROOT / "docs" / "take-off-forces.png", dpi=100)
+    """Write docs/take-off.png, docs/*-forces.png, and the tables between the marks."""
+    robot = mt.load_robot("ironcub")
+    for name in ("take-off", "take-off-and-landing", "walk-to-fly", "jump"):
+        trajectory = mt.Trajectory.load(RESULTS / name / "trajectory.npz")
+        figure = plot_forces(robot.with_jets(trajectory.jet_names), trajectory)
+        save(figure, ROOT / "docs" / f"{name}-forces.png")
+        if name == "take-off":
+            write_snapshots(robot, trajectory, ROOT / "docs" / "take-off.png")
+    for page in (ROOT / "README.md", ROOT / "docs" / "scenarios.md"):
+        before, rest = page.read_text(encoding="utf-8").split(BEGIN)
+        table = (RESULTS / "table.md").read_text(encoding="utf-8")
+        page.write_text(f"{before}{BEGIN}\n{table}{END}{rest.split(END)[1]}", encoding="utf-8")
 
 
 if __name__ == "__main__":

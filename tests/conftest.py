@@ -1,8 +1,26 @@
 from __future__ import annotations
 
+import contextlib
+import io
+import runpy
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
 import pytest
 
 import multimodal_to as mt
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+SHORT = {
+    "take_off": (35, 0.2, 0.2),
+    "landing": (35, 0.2, 0.2),
+    "take_off_and_landing": (100, 0.1, 0.2),
+    "walk_to_fly": (50, 0.2, 0.2),
+    "step_up": (35, 0.2, 0.2),
+}
+"""Knots and range of the time step [s] of the scenarios in the examples' tests: half as many as in earnest."""
 
 
 @pytest.fixture(scope="session")
@@ -14,3 +32,24 @@ def ironcub() -> mt.Robot:
 def take_off(ironcub: mt.Robot) -> mt.Solution:
     """The take-off with all its knots, from the plain start guess with default options."""
     return mt.solve(mt.build(ironcub, mt.scenarios.take_off()))
+
+
+@pytest.fixture(scope="session")
+def run_example(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[str, mt.Trajectory]]:
+    """Run an example by its name, once a session, with short scenarios; what it prints, and the trajectory it saves."""
+
+    @cache
+    def run(name: str) -> tuple[str, mt.Trajectory]:
+        printed, folder = io.StringIO(), tmp_path_factory.mktemp(name)
+        with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
+            for scenario, (knots, least, greatest) in SHORT.items():
+                short = replace(
+                    getattr(mt.scenarios, scenario)(), knots=knots, interval_min=least, interval_max=greatest
+                )
+                patch.setattr(mt.scenarios, scenario, lambda short=short: short)
+            patch.chdir(folder)
+            runpy.run_path(str(EXAMPLES / f"{name}.py"))
+        (file,) = folder.rglob("trajectory.npz")
+        return printed.getvalue(), mt.Trajectory.load(file)
+
+    return run

@@ -70,7 +70,19 @@ def test_a_changed_scenario_is_solved_and_kept_in_the_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "command", [(), ("solve",), ("plot",), ("replay",), ("audit",), ("list",), ("show",), ("robot",), ("robot", "info")]
+    "command",
+    [
+        (),
+        ("solve",),
+        ("reproduce",),
+        ("plot",),
+        ("replay",),
+        ("audit",),
+        ("list",),
+        ("show",),
+        ("robot",),
+        ("robot", "info"),
+    ],
 )
 def test_help_is_short(command):
     result = run(*command, "--help")
@@ -171,6 +183,8 @@ def test_bare_arrays_are_audited_once_their_robot_is_named(file, tmp_path):
             "unknown key 'final_height'; did you mean 'final_com_height'?",
         ),
         (("solve", "take-off", "--set", "knots=few"), "'knots' is 'few'; expected a whole number"),
+        (("reproduce", "takeoff"), "unknown scenario 'takeoff'; did you mean 'take-off'?"),
+        (("reproduce", "jump", "--published", "none"), "no .npz of a published trajectory in 'none'"),
         (("solve", "none.toml"), "cannot read 'none.toml'"),
         (("solve", "take-off", "--robot", "ironcup"), "unknown robot 'ironcup'; did you mean 'ironcub'?"),
         (("solve", "take-off", "--max-iterations", "0"), "max_iterations is 0; expected a positive number"),

@@ -11,7 +11,7 @@ import multimodal_to
 
 ROOT = Path(multimodal_to.__file__).parent
 FLOORS = [
-    {"errors"},
+    {"errors", "published"},
     {"writing"},
     {"trajectory"},
     {"resampling"},
@@ -25,6 +25,8 @@ FLOORS = [
     {"audit", "importing"},
     {"replay", "plotting"},
     {"report", "export"},
+    {"reproduce"},
+    {"comparison"},
     {"cli", "__init__"},
     {"__main__"},
 ]

@@ -14,7 +14,7 @@ import numpy as np
 from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
 from multimodal_to.audit_task import task_findings
 from multimodal_to.audit_thrust import thrust_findings
-from multimodal_to.derived import flight_phases, generalised_forces, surface_frames
+from multimodal_to.derived import LOADED, flight_phases, generalised_forces, surface_frames
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.findings import Finding, Motion, largest, worst_of
 from multimodal_to.models.contact import FrictionCone
@@ -23,10 +23,6 @@ from multimodal_to.models.terrain import FlatGround
 from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.trajectory import Array, Trajectory
-
-LOADED = 5.0
-"""A contact point carries load above this normal force [N]."""
-
 
 FRICTION_LIMIT = {FrictionCone.PYRAMID: 1e-3, FrictionCone.SECOND_ORDER: 1e-2}
 """By how much a force may be outside its cone [N]; a row of squares is met less sharply where the forces vanish."""
@@ -41,6 +37,7 @@ class Audit:
     duration: float  # [s]
     airborne: float  # longest phase of flight [s]
     final_thrust_over_weight: float  # vertical, at the last knot [1]
+    allowances_used: tuple[str, ...]  # properties that hold only because the scenario allows them more
 
     @property
     def holds(self) -> bool:
@@ -85,12 +82,15 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         *thrust_findings(robot, trajectory),
         *(task_findings(motion, scenario) if scenario else ()),
     )
+    allowed = _allow(findings, scenario.allowances) if scenario else findings
+    used = [own.name for own, wide in zip(findings, allowed, strict=True) if wide.holds and not own.holds]
     return Audit(
-        findings=_allow(findings, scenario.allowances) if scenario else findings,
+        findings=allowed,
         scenario=scenario,
         duration=trajectory.duration,
         airborne=max((end - start for start, end in phases), default=0.0),
         final_thrust_over_weight=float(motion.thrusts[:, -1, 2].sum() / robot.weight),
+        allowances_used=tuple(used),
     )
 
 

@@ -171,6 +171,53 @@ def solve(
         raise typer.Exit(1)
 
 
+@app.command("reproduce")
+def reproduce_scenarios(
+    names: Annotated[list[str] | None, typer.Argument(help="Bundled scenarios; without, all.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; made if missing.")] = Path(
+        "results"
+    ),
+    published: Annotated[
+        Path | None, typer.Option(help="Folder of the paper's trajectories as bare arrays, to audit beside.")
+    ] = None,
+) -> None:
+    """Solve the bundled scenarios again and tabulate the answers beside the paper's figures.
+
+    For each, trajectory, figures and report go to a folder of its name; the tables go to table.md. Exit status 0 only
+    when every solve has an answer that passes the audit.
+
+    Example: multimodal-to reproduce take-off jump --output results
+    """
+    scenarios = [find(name) for name in names or SCENARIOS]
+    folders = [_writable(output / scenario.name) for scenario in scenarios]
+    robot = load_robot("ironcub")
+
+    from multimodal_to.comparison import AUDITS, SOLVES, markdown, table
+    from multimodal_to.reproduce import read_published, reproduce, write_run
+    from multimodal_to.writing import write_text
+
+    files = [] if published is None else read_published(robot, published)
+    runs = []
+    for scenario, folder in zip(scenarios, folders, strict=True):
+        _out.print(f"{scenario.name}: {scenario.title}")
+        with _Progress(_out) as progress:
+            run = reproduce(robot, scenario, progress=progress)
+        write_run(run, folder)
+        runs.append(run)
+        _out.print(f"wrote {folder}", soft_wrap=True)
+        if progress.interrupted:
+            break
+    for columns in (SOLVES, AUDITS):
+        results = table([*runs, *files], columns)
+        drawn = Table(*results.titles, box=None, pad_edge=False)
+        for cells in results.rows:
+            drawn.add_row(*cells)
+        _out.print(drawn)
+    _out.print(f"wrote {write_text(output / 'table.md', markdown([*runs, *files]))}", soft_wrap=True)
+    if len(runs) < len(scenarios) or not all(run.holds for run in runs):
+        raise typer.Exit(1)
+
+
 def _load(file: Path, robot: str) -> tuple[Robot, Trajectory]:
     """Return a trajectory with its robot; a file of bare arrays needs the robot named."""
     if robot and "format_version" not in read_archive(file):
@@ -432,7 +479,7 @@ class _Progress:
     def __init__(self, console: Console) -> None:
         self._console = console
         self._live = Live(console=console, transient=True, refresh_per_second=4)
-        self._interrupted = False
+        self.interrupted = False
         self._printed = -_LINE_EVERY
 
     def __call__(self, iterate: Iterate) -> bool:
@@ -445,7 +492,7 @@ class _Progress:
         elif iterate.elapsed - self._printed >= _LINE_EVERY:
             self._printed = iterate.elapsed
             self._console.print(line, soft_wrap=True)
-        return self._interrupted
+        return self.interrupted
 
     def __enter__(self) -> _Progress:
         self._before = signal.signal(signal.SIGINT, self._interrupt)
@@ -459,4 +506,4 @@ class _Progress:
         signal.signal(signal.SIGINT, self._before)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        self._interrupted = True
+        self.interrupted = True

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from dataclasses import dataclass
 
 import casadi as cs
 import numpy as np
@@ -15,6 +17,23 @@ from multimodal_to.trajectory import Array, Trajectory
 
 FLIGHT_FORCE = 1.0
 """Below this total vertical contact force the robot counts as flying [N]."""
+LOADED = 5.0
+"""A contact point carries load above this normal force [N]."""
+STEP_LIFT = 0.01
+"""A foot has stepped when all of it was at least this far off the ground [m] ..."""
+STEP_LENGTH = 0.05
+"""... and it came down at least this far from where it stood [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Footstep:
+    """A foot that stood, was lifted and stands elsewhere."""
+
+    foot: str
+    lift_off: float  # the last time with load [s]
+    touch_down: float  # the first time with load again [s]
+    length: float  # along the ground, of the middle of the contact points [m]
+    lift: float  # greatest height of the lowest contact point [m]
 
 
 def base_poses(trajectory: Trajectory) -> Array:
@@ -77,6 +96,29 @@ def vertical_thrust(robot: Robot, trajectory: Trajectory) -> Array:
 def flying(trajectory: Trajectory) -> np.ndarray:
     """Return at which knots the total vertical contact force is below `FLIGHT_FORCE`, (knots + 1,)."""
     return trajectory.vertical_contact_force() < FLIGHT_FORCE
+
+
+def footsteps(robot: Robot, trajectory: Trajectory, surface: Surface) -> list[Footstep]:
+    """Return the steps in the order in which they start.
+
+    A foot stands while one of its contact points carries more than `LOADED`. What is in between is a step if the foot's
+    lowest point was at least `STEP_LIFT` high and its middle came down at least `STEP_LENGTH` away.
+    """
+    points = contact_points(robot, trajectory)
+    heights, normals, _ = surface_frames(surface, points)
+    loaded = np.einsum("ckx,cxk->ck", normals, trajectory.per_contact("contact_forces")) > LOADED
+    steps = []
+    for foot in dict.fromkeys(contact.foot for contact in robot.contacts):
+        members = [index for index, contact in enumerate(robot.contacts) if contact.foot == foot]
+        lowest, middle = heights[members].min(axis=0), points[members].mean(axis=0)[:, :2]
+        stands = np.flatnonzero(loaded[members].any(axis=0))
+        for before, after in itertools.pairwise(stands):
+            length = float(np.linalg.norm(middle[after] - middle[before]))
+            lift = float(lowest[before : after + 1].max())
+            if length >= STEP_LENGTH and lift >= STEP_LIFT:
+                start, end = float(trajectory.time[before]), float(trajectory.time[after])
+                steps.append(Footstep(foot=foot, lift_off=start, touch_down=end, length=length, lift=lift))
+    return sorted(steps, key=lambda step: step.lift_off)
 
 
 def flight_phases(trajectory: Trajectory) -> list[tuple[float, float]]:
