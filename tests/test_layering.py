@@ -22,7 +22,7 @@ FLOORS = [
     {"findings"},
     {"audit_task", "audit_thrust"},
     {"audit", "importing"},
-    {"replay", "plotting"},
+    {"replay", "plotting", "simulation"},
     {"report", "export"},
     {"cli", "__init__"},
     {"__main__"},
