@@ -23,7 +23,7 @@ FLOORS = [
     {"findings"},
     {"audit_task", "audit_thrust"},
     {"audit", "importing"},
-    {"replay", "plotting"},
+    {"replay", "plotting", "simulation"},
     {"report", "export"},
     {"reproduce"},
     {"comparison"},
