@@ -78,6 +78,7 @@ def test_a_changed_scenario_is_solved_and_kept_in_the_file(tmp_path):
         ("plot",),
         ("replay",),
         ("audit",),
+        ("simulate",),
         ("list",),
         ("show",),
         ("robot",),
@@ -220,3 +221,20 @@ def test_a_picture_of_an_unknown_kind_is_refused(file, tmp_path):
     result = run("plot", file, "--output", tmp_path / "forces.bmp")
     assert result.returncode == 2
     assert "is no .png, .svg or .pdf" in result.stderr
+
+
+def test_a_simulation_says_how_far_the_plan_got_and_writes_what_happened(file, tmp_path):
+    pytest.importorskip("mujoco")
+    result = run("simulate", file, "--output", tmp_path / "new" / "simulated.npz")
+    assert result.returncode == 1  # a motion made by hand, not by dynamics
+    assert "inverse dynamics at 100 random states: MuJoCo and RNEA differ by" in result.stdout
+    assert "the robot fell at" in result.stdout
+    assert Trajectory.load(tmp_path / "new" / "simulated.npz").scenario == "take-off & hover in MuJoCo"
+
+
+def test_a_simulation_is_written_only_to_a_trajectory_file(file, tmp_path):
+    result = run("simulate", file, "--output", tmp_path / "simulated.html")
+    assert (result.returncode, result.stderr) == (2, f"error: '{tmp_path / 'simulated.html'}' is no .npz\n")
+    result = run("simulate", tmp_path / "none.npz")
+    assert result.returncode == 2
+    assert "no trajectory file" in result.stderr

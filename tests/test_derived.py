@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from multimodal_to.derived import base_poses, footsteps, resample
+from multimodal_to.derived import base_poses, footsteps
 from multimodal_to.errors import InputError
 from multimodal_to.models.terrain import FlatGround
+from multimodal_to.resampling import resample
 from synthetic import DURATION, take_off
 
 

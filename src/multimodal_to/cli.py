@@ -1,6 +1,7 @@
 """The command line, `multimodal-to`: the only part of the library that prints.
 
-Exit status: 0 when done, 1 when a solve ended without an answer or an audit found something, 2 on bad input.
+Exit status: 0 when done, 1 when a solve ended without an answer, an audit found something or a simulated
+robot fell, 2 on bad input.
 """
 
 from __future__ import annotations
@@ -132,6 +133,9 @@ def solve(
     robot: RobotOption = "ironcub",
     max_iterations: Annotated[int, typer.Option(help="Give up after so many iterations.")] = 1000,
     time_limit: Annotated[float, typer.Option(help="Give up after so many seconds in the solver.")] = 3600.0,
+    warm_start: Annotated[
+        Path | None, typer.Option(help="Trajectory of a task much like this one to start from, for a faster answer.")
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Solve a scenario; write the trajectory, its plot and its replay page.
@@ -140,6 +144,7 @@ def solve(
     """
     scenario = _scenario(name, settings)
     solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit)
+    start = None if warm_start is None else Trajectory.load(warm_start)
     folder = _writable(output or Path("results") / scenario.name)
     console = Console(highlight=False, quiet=quiet)
     started = time.perf_counter()
@@ -151,7 +156,7 @@ def solve(
         soft_wrap=True,
     )
     with _Progress(console) as progress:
-        solution = run_solver(problem, solver, progress)
+        solution = run_solver(problem, solver, progress, start=start)
     report = audit(the_robot, solution.trajectory, scenario)
     _summarise(console, solution, report)
 
@@ -354,6 +359,56 @@ def export_file(
         raise OutputError(f"'{target}' is no {suffix}")
     _writable(target.parent)
     _out.print(f"wrote {write(the_robot, trajectory, target)}", soft_wrap=True)
+
+
+@app.command()
+def simulate(
+    file: File,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Simulated trajectory to write. [FILE-simulated.npz]")
+    ] = None,
+    stabilise: Annotated[
+        bool, typer.Option(help="Let a small stabiliser correct thrusts, contact forces and joints.")
+    ] = True,
+    robot: RobotOption = "",
+) -> None:
+    """Play a trajectory back in MuJoCo, say how far it gets, and write what happened as a trajectory.
+
+    Exit status 0 when the robot stands or hovers at the end, 1 when not. Needs the extra `sim`.
+
+    Example: multimodal-to simulate results/take-off/trajectory.npz --output simulated.npz
+    """
+    target = output or file.with_stem(f"{file.stem}-simulated")
+    if target.suffix.lower() != ".npz":
+        raise OutputError(f"'{target}' is no .npz")
+    the_robot, plan = _load(file, robot)
+    from multimodal_to import simulation
+
+    agreement = {
+        "at 100 random states": simulation.disagreement(the_robot, simulation.random_states(the_robot, 100)),
+        "along the plan": simulation.disagreement(the_robot, simulation.states_along(plan)),
+    }
+    _writable(target.parent)
+    playback = simulation.play(the_robot, plan, stabilise=stabilise)
+    outcome = simulation.tracking(playback)
+    for where, difference in agreement.items():
+        _out.print(f"inverse dynamics {where}: MuJoCo and RNEA differ by {difference:.1e} of the largest force",
+                   soft_wrap=True)  # fmt: skip
+    _out.print(
+        f"largest errors over {plan.duration:.2f} s: CoM {100 * outcome.com:.1f} cm, base {outcome.attitude:.1f}°, "
+        f"joints {outcome.joint:.1f}° ({outcome.joint_name}), thrust {outcome.thrust:.1f} N; largest torque "
+        f"{100 * outcome.torque_over_effort:.0f} % of its joint's effort limit",
+        soft_wrap=True,
+    )
+    for switch in outcome.switches:
+        kind = "touch-down" if switch.touches else "lift-off"
+        happened = "never" if switch.simulated is None else f"{switch.simulated - switch.planned:+.2f} s"
+        _out.print(f"{kind} of the {switch.foot} foot: planned at {switch.planned:.2f} s, simulated {happened}")
+    when = "" if outcome.fell is None else f" at {outcome.fell:.2f} s"
+    _out.print(f"the robot {outcome.end}{when}; CoM error after the end "
+               f"{100 * outcome.com_at_end:.1f} cm, base {outcome.attitude_at_end:.1f}°", soft_wrap=True)  # fmt: skip
+    _out.print(f"wrote {simulation.simulated_trajectory(playback).save(target)}", soft_wrap=True)
+    raise typer.Exit(0 if outcome.end in ("stands", "hovers") else 1)
 
 
 @robot_app.command("info")

@@ -9,7 +9,7 @@ import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
-from multimodal_to.errors import ScenarioError
+from multimodal_to.errors import InputError, ScenarioError
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Remembered
 from multimodal_to.ocp.boundary import set_boundary
@@ -19,7 +19,8 @@ from multimodal_to.ocp.scenario import Scenario, Start, Terminal
 from multimodal_to.ocp.stages import NamedStage, collect
 from multimodal_to.ocp.transcription import Nlp, assemble
 from multimodal_to.ocp.variables import INTERVAL_SCALE, Layout, ranges
-from multimodal_to.trajectory import QUANTITIES
+from multimodal_to.resampling import resample
+from multimodal_to.trajectory import QUANTITIES, Trajectory
 
 Array = NDArray[np.float64]
 
@@ -53,6 +54,25 @@ class Problem:
     cost_names: tuple[str, ...]  # in the order of nlp.costs; a name may occur more than once
     guess: Array  # of x
     scale: Array = field(repr=False)  # of x
+
+    def start_from(self, trajectory: Trajectory) -> Array:
+        """Return x for a motion of the same robot: at equal shares of its duration, moved within the bounds.
+
+        Raises:
+            InputError: it is a motion of another robot, or of other contact points or jets.
+        """
+        for label, here, there in (
+            ("joints", self.robot.joint_names, trajectory.joint_names),
+            ("contact points", self.robot.contact_names, trajectory.contact_names),
+            ("jets", self.robot.jet_names, trajectory.jet_names),
+        ):
+            if here != there:
+                raise InputError(f"the {label} of the motion to start from are {there}; expected {here}")
+        knots = self.scenario.knots
+        motion = resample(trajectory, np.linspace(trajectory.time[0], trajectory.time[-1], knots + 1))
+        values = np.vstack([getattr(motion, name) for name in self.layout.rows])
+        x = np.append(values.ravel(order="F"), trajectory.duration / knots) / self.scale
+        return np.clip(x, self.lower, self.upper)
 
     def largest_violations(self, x: Array) -> dict[str, float]:
         """Return by how much each set of rows, and each variable's bounds, are missed at x, in their own units."""

@@ -16,7 +16,7 @@ from multimodal_to.models.terrain import SURFACES
 from multimodal_to.ocp.problem import Problem
 from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.ocp.scenario_data import to_json
-from multimodal_to.ocp.solvers import Ipopt, Status
+from multimodal_to.ocp.solvers import Ipopt, Phase, Status
 from multimodal_to.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -60,8 +60,14 @@ Progress = Callable[[Iterate], bool]
 """Called at every iteration; a true answer stops the solve."""
 
 
-def solve(problem: Problem, solver: Ipopt | None = None, progress: Progress | None = None) -> Solution:
-    """Solve a problem from its start guess.
+def solve(
+    problem: Problem,
+    solver: Ipopt | None = None,
+    progress: Progress | None = None,
+    *,
+    start: Trajectory | None = None,
+) -> Solution:
+    """Solve a problem from its start guess, or from a motion.
 
     A rough phase without the rows' curvature finds a motion that nearly meets the rows; from it the exact one finds
     the answer.
@@ -70,18 +76,21 @@ def solve(problem: Problem, solver: Ipopt | None = None, progress: Progress | No
         problem: from `build`.
         solver: by default `Ipopt()`; its limits are for all solves together.
         progress: told of every iteration; it may stop the solve by returning True.
+        start: the answer of a problem much like this one, with any number of knots; without a rough phase.
 
     Raises:
+        InputError: the start is a motion of another robot.
         SolverError: the solver could not be run.
     """
     solver = solver or Ipopt()
-    started, iterations, x = time.perf_counter(), 0, problem.guess
-    for rough in (True, False):
+    started, iterations = time.perf_counter(), 0
+    x = problem.guess if start is None else problem.start_from(start)
+    for phase in (Phase.ROUGH, Phase.EXACT) if start is None else (Phase.WARM,):
         seconds = max(solver.time_limit - (time.perf_counter() - started), 1e-3)
         left = max(solver.max_iterations - iterations, 1)
-        options = solver.options(left, seconds, rough=rough)
+        options = solver.options(left, seconds, phase)
         watcher = None if progress is None else _Watcher(problem, progress, started, iterations)
-        x, statistics = _run(problem, x, options, watcher, rough=rough)
+        x, statistics = _run(problem, x, options, watcher, phase)
         iterations += int(statistics["iter_count"])
         message = str(statistics["return_status"])
         status = Ipopt.status(message)
@@ -96,7 +105,7 @@ def solve(problem: Problem, solver: Ipopt | None = None, progress: Progress | No
 
 
 def _run(
-    problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher | None, *, rough: bool
+    problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher | None, phase: Phase
 ) -> tuple[Array, dict[str, Any]]:
     """Run IPOPT once from x; return where it ended, answer or not, and its statistics."""
     opti = problem.opti
@@ -105,7 +114,7 @@ def _run(
         "detect_simple_bounds": True,
         "jac_g": problem.nlp.jacobian,
         "grad_f": problem.nlp.gradient,
-        "hess_lag": problem.nlp.cost_hessian if rough else problem.nlp.hessian,
+        "hess_lag": problem.nlp.cost_hessian if phase is Phase.ROUGH else problem.nlp.hessian,
     }
     if watcher is not None:
         options["iteration_callback"] = watcher

@@ -58,6 +58,21 @@ _ROUGH_PUSH = 0.1
 """How far the start guess is moved inside its bounds, in solver units and as a share of their distance."""
 
 
+_WARM_PUSH = 1e-6
+"""The same for an answer to start from, which touches its bounds."""
+
+
+class Phase(Enum):
+    """What a run of the solver starts from, and with which Hessian."""
+
+    ROUGH = "rough"
+    """From a start guess, without the curvature of the rows."""
+    EXACT = "exact"
+    """From where the rough phase ended."""
+    WARM = "warm"
+    """From the answer of a problem much like this one, with little of the barrier left."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Ipopt:
     """IPOPT with MUMPS: a monotone barrier on exact derivatives, in two phases.
@@ -82,13 +97,14 @@ class Ipopt:
     where the start guess has them.
     """
     barrier_start: float = 0.1
+    barrier_warm: float = 1e-3  # where a solve that starts from an answer begins
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             if not getattr(self, name) > 0:
                 raise InputError(f"{name} is {getattr(self, name)}; expected a positive number")
 
-    def options(self, iterations: int, seconds: float, *, rough: bool) -> dict[str, Any]:
+    def options(self, iterations: int, seconds: float, phase: Phase) -> dict[str, Any]:
         """Return IPOPT's own options for a phase within a budget."""
         options: dict[str, Any] = {
             "print_level": 0,
@@ -96,19 +112,21 @@ class Ipopt:
             "linear_solver": "mumps",
             "mumps_pivtol": 1e-8,
             "mu_strategy": "monotone",
-            "mu_init": self.barrier_start,
+            "mu_init": self.barrier_warm if phase is Phase.WARM else self.barrier_start,
             "tol": self.tolerance,
             "constr_viol_tol": self.violation_tolerance,
             "compl_inf_tol": 1.0,  # in units of the cost, whose size is a million
-            "max_iter": min(iterations, self.rough_iterations) if rough else iterations,
+            "max_iter": min(iterations, self.rough_iterations) if phase is Phase.ROUGH else iterations,
             "nlp_scaling_method": "none",  # rows and variables come with their scales
             "obj_scaling_factor": self.objective_scale,
             "honor_original_bounds": "yes",
         }
         if math.isfinite(seconds):
             options["max_wall_time"] = seconds
-        if rough:
+        if phase is Phase.ROUGH:
             options |= dict.fromkeys(("bound_push", "bound_frac"), _ROUGH_PUSH)
+        if phase is Phase.WARM:
+            options |= dict.fromkeys(("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"), _WARM_PUSH)
         return options
 
     @staticmethod

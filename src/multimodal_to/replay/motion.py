@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multimodal_to.derived import frame_poses, resample
+from multimodal_to.derived import frame_poses
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Surface
@@ -18,6 +18,7 @@ from multimodal_to.replay.effects import draw_com, draw_com_trace, draw_contact_
 from multimodal_to.replay.scene import Scene, meshcat
 from multimodal_to.replay.stage import View, draw_stage
 from multimodal_to.replay.visuals import Appearance, Visual
+from multimodal_to.resampling import resample
 from multimodal_to.trajectory import QUANTITIES, Array, Trajectory
 
 FOLLOW_FROM = 0.6

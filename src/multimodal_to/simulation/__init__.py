@@ -1,0 +1,22 @@
+"""A second opinion: a plan in MuJoCo, which shares no code with the problem that was solved."""
+
+from multimodal_to.simulation.agreement import by_mujoco, by_rnea, disagreement, random_states, states_along
+from multimodal_to.simulation.model import SimulationModel, build_model
+from multimodal_to.simulation.playback import Playback, play
+from multimodal_to.simulation.report import Switch, Tracking, simulated_trajectory, tracking
+
+__all__ = [
+    "Playback",
+    "SimulationModel",
+    "Switch",
+    "Tracking",
+    "build_model",
+    "by_mujoco",
+    "by_rnea",
+    "disagreement",
+    "play",
+    "random_states",
+    "simulated_trajectory",
+    "states_along",
+    "tracking",
+]

@@ -1,0 +1,229 @@
+"""A robot and its ground as a MuJoCo model, from the same URDF reader: same masses, inertias, frames and friction.
+
+Every link is a body; only the joints that the plan moves are joints, the others are held where the robot holds them.
+Feet are points: a small sphere at each contact point, on a ground that lies one radius deeper, so that a point touches
+where d(p) = 0. Nothing else of the robot touches anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from multimodal_to.adam.tree import Joint, Link
+from multimodal_to.adam.urdf import read_urdf
+from multimodal_to.errors import ModelError, OutputError
+from multimodal_to.models.robot import Robot
+from multimodal_to.models.terrain import FlatGround, Plane, Surface, frame_function, heights_below
+from multimodal_to.trajectory import Array
+
+TIME_STEP = 1e-3  # [s]
+POINT_RADIUS = 2e-3  # of the sphere at a contact point [m]
+CONTACT_TIME = 5e-3
+"""Time constant of a contact, critically damped [s]: the softest part of the model."""
+STIFFNESS = 300.0
+"""K of each joint's servo, τ = K (target − s) − D ṡ [N m/rad]."""
+DAMPING = 10.0
+"""D of each joint's servo [N m s/rad]; MuJoCo integrates it implicitly."""
+CELL = 0.02  # of the grid on which ground that is no plane is sampled [m]
+DEPTH = 1.0  # of the ground below its lowest point [m]
+
+
+def mujoco_module() -> ModuleType:
+    """Return the package `mujoco`.
+
+    Raises:
+        OutputError: it is not installed.
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise OutputError("a simulation needs MuJoCo: pip install 'multimodal-to[sim]'") from error
+    return mujoco  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SimulationModel:
+    """A compiled model with where its numbers stand.
+
+    MuJoCo's qpos is (p, quaternion w x y z, joints), its qvel (ṗ in world axes, ω in the base's axes, joint
+    velocities), with the joints in an order of its own. Its ctrl is in the robot's order: where each joint's servo
+    wants it [rad or m], then the thrusts [N].
+    """
+
+    robot: Robot
+    model: Any  # mujoco.MjModel
+    joint_positions: NDArray[np.int64]  # of s in qpos, (n,)
+    joint_velocities: NDArray[np.int64]  # of ṡ in qvel, (n,)
+    points: NDArray[np.int64]  # geom of each contact point, (contacts,)
+    jets: NDArray[np.int64]  # site of each jet, (jets,)
+
+    def set_state(
+        self,
+        data: Any,
+        position: Array,
+        quaternion_xyzw: Array,
+        joints: Array,
+        velocity: Array,
+        joint_velocities: Array,
+    ) -> None:
+        """Put `data` into a state; the velocity is (ṗ, ω) of the base in world axes, (6,)."""
+        turn = np.zeros(9)
+        data.qpos[:3], data.qpos[3:7] = position, quaternion_xyzw[[3, 0, 1, 2]] / np.linalg.norm(quaternion_xyzw)
+        data.qpos[self.joint_positions] = joints
+        mujoco_module().mju_quat2Mat(turn, data.qpos[3:7])
+        data.qvel[:3], data.qvel[3:6] = velocity[:3], turn.reshape(3, 3).T @ velocity[3:]
+        data.qvel[self.joint_velocities] = joint_velocities
+
+
+def build_model(
+    robot: Robot, surface: Surface | None = None, friction: float | None = None, *, middle: Array | None = None,
+    reach: float = 3.0,
+) -> SimulationModel:  # fmt: skip
+    """Return a robot on its ground.
+
+    Args:
+        robot: which joints move, where it touches, which jets it has.
+        surface: the ground; without one nothing is below the robot.
+        friction: Coulomb's μ, a round cone; the robot's own by default.
+        middle: of the ground that is built where it is no plane [m], (2,); the world's origin by default.
+        reach: how far that goes to each side [m].
+
+    Raises:
+        OutputError: MuJoCo is not installed.
+        ModelError: MuJoCo refuses the robot, for example because of an inertia that no body can have.
+    """
+    mujoco = mujoco_module()
+    spec = mujoco.MjSpec()
+    spec.option.gravity = robot.gravity
+    spec.option.timestep = TIME_STEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 100.0  # friction as stiff as a foot that must not creep needs it
+    spec.compiler.boundmass = spec.compiler.boundinertia = 0.0  # keep what the URDF says
+    spec.compiler.balanceinertia = False
+    spec.compiler.discardvisual = spec.compiler.fusestatic = False
+    _add_bodies(mujoco, spec, robot)
+    mu = robot.friction if friction is None else friction
+    for name in robot.contact_names:
+        spec.body(name).add_geom(
+            name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[POINT_RADIUS, 0.0, 0.0], mass=0.0, condim=3,
+            friction=[mu, 0.0, 0.0], solref=[CONTACT_TIME, 1.0], contype=1, conaffinity=0,
+        )  # fmt: skip
+    if surface is not None:
+        _add_ground(mujoco, spec, surface, mu, np.zeros(2) if middle is None else middle, reach)
+    _add_actuators(mujoco, spec, robot)
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        raise ModelError(f"MuJoCo refuses '{robot.urdf}': {error}") from error
+    return SimulationModel(
+        robot=robot,
+        model=model,
+        joint_positions=_integers(model.joint(name).qposadr[0] for name in robot.joint_names),
+        joint_velocities=_integers(model.joint(name).dofadr[0] for name in robot.joint_names),
+        points=_integers(model.geom(name).id for name in robot.contact_names),
+        jets=_integers(model.site(name).id for name in robot.jet_names),
+    )
+
+
+def _integers(values: Iterable[int]) -> NDArray[np.int64]:
+    return np.array(list(values), dtype=np.int64)
+
+
+def _add_bodies(mujoco: ModuleType, spec: Any, robot: Robot) -> None:
+    """Add every link, parents first, and the joints that move in the order of s."""
+    links, joints = read_urdf(robot.urdf)
+    tree = robot.kindyn.tree
+    by_name = {link.name: link for link in links}
+    below: dict[str, list[Joint]] = {}
+    for joint in joints:
+        below.setdefault(joint.parent, []).append(joint)
+    base = spec.worldbody.add_body(name=tree.base)
+    base.add_freejoint(name="base")
+    pending = [(tree.base, base)]
+    while pending:
+        name, body = pending.pop()
+        _set_inertia(body, by_name[name])
+        for joint in reversed(below.get(name, [])):
+            child = body.add_body(name=joint.child, pos=joint.translation, quat=_quaternion(mujoco, joint.rotation))
+            if joint.name in tree.joint_names:
+                kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
+                child.add_joint(name=joint.name, type=kind, axis=joint.axis)
+            elif joint.kind != "fixed":
+                _hold(mujoco, child, joint, tree.locked[joint.name])
+            pending.append((joint.child, child))
+
+
+def _set_inertia(body: Any, link: Link) -> None:
+    body.explicitinertial = True
+    body.mass = link.mass
+    body.ipos = link.com
+    if link.inertia.any():
+        body.fullinertia = link.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+
+
+def _quaternion(mujoco: ModuleType, rotation: Array) -> Array:
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, np.asarray(rotation, dtype=float).ravel())
+    return quaternion
+
+
+def _hold(mujoco: ModuleType, body: Any, joint: Joint, value: float) -> None:
+    """Put a body where its joint is at a value [rad or m]."""
+    if joint.kind == "prismatic":
+        body.pos = joint.translation + joint.rotation @ joint.axis * value
+        return
+    turn, turned = np.zeros(4), np.zeros(4)
+    mujoco.mju_axisAngle2Quat(turn, joint.axis, value)
+    mujoco.mju_mulQuat(turned, _quaternion(mujoco, joint.rotation), turn)
+    body.quat = turned
+
+
+def _add_ground(mujoco: ModuleType, spec: Any, surface: Surface, mu: float, middle: Array, reach: float) -> None:
+    """Add the ground, one radius of the contact points deeper along its normal."""
+    contact = {"condim": 3, "friction": [mu, 0.0, 0.0], "solref": [CONTACT_TIME, 1.0], "contype": 0, "conaffinity": 1}
+    if isinstance(surface, FlatGround | Plane):
+        at = np.array([0.0, 0.0, surface.height])
+        _, normal, tangents = (np.array(part) for part in frame_function(surface)(at))
+        rotation = np.column_stack([tangents, normal])
+        spec.worldbody.add_geom(
+            name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], quat=_quaternion(mujoco, rotation),
+            pos=at - POINT_RADIUS * normal.ravel(), **contact,
+        )  # fmt: skip
+        return
+    count = 2 * int(np.ceil(reach / CELL)) + 1
+    steps = np.linspace(-reach, reach, count)
+    y, x = np.meshgrid(middle[1] + steps, middle[0] + steps, indexing="ij")  # rows go along y
+    points = np.vstack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    heights = heights_below(surface, points)
+    points[2] = heights
+    normals = np.array(frame_function(surface).map(x.size)(points)[1])
+    heights = heights - POINT_RADIUS / normals[2]
+    low, span = float(heights.min()), float(max(np.ptp(heights), 1e-6))
+    spec.add_hfield(
+        name="ground", nrow=count, ncol=count, size=[reach, reach, span, DEPTH],
+        userdata=((heights - low) / span).tolist(),
+    )  # fmt: skip
+    spec.worldbody.add_geom(
+        name="ground", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="ground", pos=[*middle, low], **contact
+    )
+
+
+def _add_actuators(mujoco: ModuleType, spec: Any, robot: Robot) -> None:
+    """Add a servo at each joint, and at each jet a force along −z of a site that is the jet's frame."""
+    for name in robot.joint_names:
+        spec.add_actuator(
+            name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name, gainprm=[STIFFNESS] + 9 * [0.0],
+            biastype=mujoco.mjtBias.mjBIAS_AFFINE, biasprm=[0.0, -STIFFNESS, -DAMPING] + 7 * [0.0],
+        )  # fmt: skip
+    for jet in robot.jets:
+        spec.body(jet.frame).add_site(name=jet.name)
+        spec.add_actuator(
+            name=jet.name, trntype=mujoco.mjtTrn.mjTRN_SITE, target=jet.name, gear=[0.0, 0.0, -1.0, 0.0, 0.0, 0.0]
+        )

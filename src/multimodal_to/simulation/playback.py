@@ -1,0 +1,201 @@
+"""A plan played back in MuJoCo: joint servos with the planned torques, turbines at the planned throttle, a stabiliser.
+
+Turbines are integrated from their own dynamics. On top of the planned throttle comes what brings the thrust to the plan
+plus the stabiliser's ΔT: T̈ = T̈* + K_T (T* + ΔT − T) + D_T (Ṫ* − Ṫ), solved for u and kept within its range.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from multimodal_to.errors import TrajectoryError
+from multimodal_to.models.jet import Jet
+from multimodal_to.models.robot import Robot
+from multimodal_to.models.terrain import FlatGround
+from multimodal_to.ocp.scenario_data import stored
+from multimodal_to.simulation.model import DAMPING, STIFFNESS, TIME_STEP, SimulationModel, build_model, mujoco_module
+from multimodal_to.simulation.reference import Reference, reference
+from multimodal_to.simulation.stabiliser import Correction, Turbines, correct
+from multimodal_to.trajectory import Array, Trajectory
+
+HOLD = 1.0  # how long the end of the plan is held [s]
+THRUST_STIFFNESS, THRUST_DAMPING = 25.0, 10.0  # K_T [1/s²], D_T [1/s]
+JOINT_LAG = 0.03  # with which joints take over the stabiliser's wish [s]
+REACH = 2.0  # how far ground that is no plane goes beyond the way of the CoM [m]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Playback:
+    """What a simulation did: a row for each of its steps, in world axes."""
+
+    robot: Robot
+    plan: Trajectory
+    reference: Reference
+    time: Array  # since the start [s], (steps,)
+    com: Array  # [m], (steps, 3)
+    qpos: Array  # base position, quaternion w x y z, joints in the robot's order, (steps, 7 + n)
+    qvel: Array  # ṗ and ω of the base in world axes, ṡ, (steps, 6 + n)
+    contact_forces: Array  # on the robot [N], (steps, contacts, 3)
+    thrust: Array  # [N], (steps, jets)
+    thrust_rate: Array  # [N/s], (steps, jets)
+    throttle: Array  # [%], (steps, jets)
+    torques: Array  # of the servos [N m], (steps, n)
+
+
+def play(robot: Robot, plan: Trajectory, *, stabilise: bool = True) -> Playback:
+    """Play a plan back on the ground and with the friction of the scenario that it keeps.
+
+    Without `stabilise` only the joints' servos close a loop, and turbines get the planned throttle.
+
+    Raises:
+        OutputError: MuJoCo is not installed.
+        TrajectoryError: the plan is not one of this robot with these jets.
+    """
+    names = ((robot.joint_names, plan.joint_names), (robot.contact_names, plan.contact_names),
+             (robot.jet_names, plan.jet_names))  # fmt: skip
+    if any(ours != theirs for ours, theirs in names):
+        raise TrajectoryError(f"the plan's joints, contact points or jets are not those of the robot '{robot.name}'")
+    scenario = stored(plan)
+    friction = robot.friction if scenario is None or scenario.friction is None else scenario.friction
+    low, high = (getattr(plan.com_position[:2], end)(axis=1) for end in ("min", "max"))
+    simulation = build_model(
+        robot, FlatGround() if scenario is None else scenario.surface, friction, middle=(low + high) / 2.0,
+        reach=float((high - low).max()) / 2.0 + REACH,
+    )  # fmt: skip
+    return _Player(simulation, plan, friction, stabilise).run()
+
+
+class _Player:
+    """A simulation that runs, with everything that changes as it does."""
+
+    def __init__(self, simulation: SimulationModel, plan: Trajectory, friction: float, stabilise: bool) -> None:
+        self._mujoco = mujoco_module()
+        self._simulation, self._plan, self._robot = simulation, plan, simulation.robot
+        self._friction, self._stabilise = friction, stabilise
+        self._data = self._mujoco.MjData(simulation.model)
+        self._time: Array = np.asarray(
+            TIME_STEP * np.arange(round((plan.duration + HOLD) / TIME_STEP) + 1), dtype=float
+        )
+        self._reference = reference(self._robot, plan, self._time)
+        self._inertia = _inertia(self._robot)
+        self._thrust, self._rate = plan.thrust[:, 0].copy(), plan.thrust_rate[:, 0].copy()
+        self._throttle, self._shift = plan.throttle[:, 0].copy(), np.zeros(len(self._robot.joint_names))
+
+    def run(self) -> Playback:
+        plan, data, model = self._plan, self._data, self._simulation.model
+        velocity = np.concatenate([plan.base_linear_velocity[:, 0], plan.base_angular_velocity[:, 0]])
+        self._simulation.set_state(
+            data, plan.base_position[:, 0], plan.base_quaternion_xyzw[:, 0], plan.joint_positions[:, 0], velocity,
+            plan.joint_velocities[:, 0],
+        )  # fmt: skip
+        rows: list[dict[str, Array]] = []
+        for step in range(self._time.size):
+            self._mujoco.mj_step1(model, data)
+            self._mujoco.mj_subtreeVel(model, data)
+            rows.append(self._state())
+            rows[-1] |= self._control(step)
+            self._mujoco.mj_step2(model, data)
+            rows[-1] |= {"contact_forces": self._contact_forces()}
+        return Playback(
+            robot=self._robot, plan=plan, reference=self._reference, time=self._time,
+            **{name: np.array([row[name] for row in rows]) for name in rows[0]},
+        )  # fmt: skip
+
+    def _state(self) -> dict[str, Array]:
+        data, simulation = self._data, self._simulation
+        turn = data.xmat[1].reshape(3, 3)
+        return {
+            "com": data.subtree_com[1].copy(),
+            "qpos": np.concatenate([data.qpos[:7], data.qpos[simulation.joint_positions]]),
+            "qvel": np.concatenate(
+                [data.qvel[:3], turn @ data.qvel[3:6], data.qvel[simulation.joint_velocities]]
+            ),
+            "thrust": self._thrust.copy(),
+            "thrust_rate": self._rate.copy(),
+        }  # fmt: skip
+
+    def _control(self, step: int) -> dict[str, Array]:
+        """Set the servos' targets and the thrusts of this step; return throttles and torques."""
+        data, plan, robot = self._data, self._reference, self._robot
+        correction = Correction.none(robot)
+        if self._stabilise:
+            turbines = Turbines(
+                thrust=self._thrust,
+                at_most=self._throttle >= np.array([jet.throttle_max for jet in robot.jets]),
+                at_least=self._throttle <= np.array([jet.throttle_min for jet in robot.jets]),
+            )
+            correction = correct(self._simulation, data, plan, step, turbines, self._inertia, self._friction)
+        self._turn_turbines(step, correction.thrust)
+        self._shift += (correction.joints - self._shift) * TIME_STEP / JOINT_LAG
+        torques = plan.torques[step] - self._borne_by_joints(step, correction)
+        count = len(robot.joint_names)
+        target = plan.joints[step] + self._shift
+        data.ctrl[:count] = target + (torques + DAMPING * plan.joint_velocities[step]) / STIFFNESS
+        data.ctrl[count:] = self._thrust
+        servos = STIFFNESS * (data.ctrl[:count] - data.qpos[self._simulation.joint_positions])
+        servos -= DAMPING * data.qvel[self._simulation.joint_velocities]
+        return {"throttle": self._throttle.copy(), "torques": servos}
+
+    def _turn_turbines(self, step: int, change: Array) -> None:
+        """Set the throttles and integrate the thrusts over a step."""
+        plan = self._reference
+        for index, jet in enumerate(self._robot.jets):
+            state = float(self._thrust[index]), float(self._rate[index])
+            planned = float(plan.thrust[step, index]), float(plan.thrust_rate[step, index])
+            throttle = float(plan.throttle[step, index])
+            if self._stabilise:
+                wish = min(max(planned[0] + float(change[index]), 0.0), jet.thrust_max)
+                acceleration = float(jet.model.acceleration(*planned, throttle))
+                acceleration += THRUST_STIFFNESS * (wish - state[0]) + THRUST_DAMPING * (planned[1] - state[1])
+                throttle = _throttle(jet, *state, acceleration)
+            self._throttle[index] = throttle
+            self._rate[index] += TIME_STEP * float(jet.model.acceleration(*state, throttle))
+            self._thrust[index] = max(state[0] + TIME_STEP * self._rate[index], 0.0)
+
+    def _borne_by_joints(self, step: int, correction: Correction) -> Array:
+        """Return Jᵀ f of the thrusts' difference from the plan and of the forces that are asked of the ground."""
+        data, simulation, plan = self._data, self._simulation, self._reference
+        jacobian, total = np.zeros((3, simulation.model.nv)), np.zeros(simulation.model.nv)
+        if self._stabilise:
+            for index, site in enumerate(simulation.jets):
+                self._mujoco.mj_jacSite(simulation.model, data, jacobian, None, site)
+                axis = -data.site_xmat[site].reshape(3, 3)[:, 2]
+                total += jacobian.T @ axis * (self._thrust[index] - plan.thrust[step, index])
+            for index, force in enumerate(correction.contact_forces):
+                if force.any():
+                    self._mujoco.mj_jacGeom(simulation.model, data, jacobian, None, simulation.points[index])
+                    total += jacobian.T @ force
+        return np.asarray(total[simulation.joint_velocities])
+
+    def _contact_forces(self) -> Array:
+        """Return the force of the ground on each contact point, (contacts, 3)."""
+        data, points = self._data, self._simulation.points.tolist()
+        forces, wrench = np.zeros((len(points), 3)), np.zeros(6)
+        for index, contact in enumerate(data.contact):
+            first, second = contact.geom
+            self._mujoco.mj_contactForce(self._simulation.model, data, index, wrench)
+            force = contact.frame.reshape(3, 3).T @ wrench[:3]  # from the first on the second
+            forces[points.index(second if second in points else first)] += force if second in points else -force
+        return forces
+
+
+def _throttle(jet: Jet, thrust: float, rate: float, acceleration: float) -> float:
+    """Return the throttle within its range whose T̈ comes nearest to the one wanted: u + B_UU u² = (T̈ − f) / g."""
+    model: Any = jet.model
+    gain = model.B_U + model.B_T * thrust + model.B_D * rate
+    wanted = (acceleration - float(model.acceleration(thrust, rate, 0.0))) / gain
+    root = 1.0 + 4.0 * model.B_UU * wanted
+    throttle = jet.throttle_max if root < 0.0 else 2.0 * wanted / (1.0 + root**0.5)
+    return float(min(max(throttle, jet.throttle_min), jet.throttle_max))
+
+
+def _inertia(robot: Robot) -> Array:
+    """Return the robot's inertia about its CoM at home [kg m²], (3, 3)."""
+    pose, joints = np.eye(4), robot.home.joint_positions
+    mass = np.array(robot.kindyn.mass_matrix(pose, joints))
+    x, y, z = np.array(robot.kindyn.CoM_position(pose, joints)).ravel()
+    arm = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(mass[3:6, 3:6] + robot.mass * arm @ arm)

@@ -1,0 +1,174 @@
+"""What came of a playback: how far it left the plan, whether it fell, and the motion as a `Trajectory`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from multimodal_to.derived import base_poses, contact_points
+from multimodal_to.simulation.playback import Playback
+from multimodal_to.simulation.stabiliser import rotation_vector
+from multimodal_to.trajectory import Array, Trajectory
+
+FALL_TILT = 45.0
+"""A base turned away from the plan by more than this has fallen [°]."""
+FALL_DEPTH = 0.25
+"""A CoM lower than the plan by more than this has fallen [m]."""
+TOUCHING = 5.0
+"""A foot that bears more than this stands [N]."""
+BLINK = 0.1
+"""A foot that stands or floats for less than this hasn't switched [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Switch:
+    """A planned touch-down or lift-off of a foot, and when the simulated one was; None where there was none."""
+
+    foot: str
+    touches: bool
+    planned: float  # [s]
+    simulated: float | None  # [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tracking:
+    """The largest errors over the plan, and how things stood after its end was held."""
+
+    com: float  # [m]
+    attitude: float  # of the base [°]
+    joint: float  # [°]
+    joint_name: str
+    thrust: float  # [N]
+    switches: tuple[Switch, ...]
+    torque_over_effort: float  # largest torque over the URDF's effort limit of its joint [1]
+    fell: float | None  # when [s]
+    end: str  # "fell", "stands", "hovers" or "in the air"
+    com_at_end: float  # [m]
+    attitude_at_end: float  # [°]
+
+
+def tracking(playback: Playback) -> Tracking:
+    """Return the errors of a playback."""
+    plan, robot, reference = playback.plan, playback.robot, playback.reference
+    during = playback.time <= plan.duration
+    com = np.linalg.norm(playback.com - reference.com, axis=1)
+    attitude = np.degrees([
+        np.linalg.norm(rotation_vector(wanted @ turn.T))
+        for wanted, turn in zip(reference.rotation, _rotations(playback.qpos), strict=True)
+    ])  # fmt: skip
+    joints = np.degrees(np.abs(playback.qpos[:, 7:] - reference.joints))[during].max(axis=0)
+    thrust = np.abs(playback.thrust - reference.thrust)[during]
+    down = (attitude > FALL_TILT) | (reference.com[:, 2] - playback.com[:, 2] > FALL_DEPTH)
+    fell = float(playback.time[np.argmax(down)]) if down.any() else None
+    return Tracking(
+        com=float(com[during].max()),
+        attitude=float(attitude[during].max()),
+        joint=float(joints.max()),
+        joint_name=robot.joint_names[int(joints.argmax())],
+        thrust=float(thrust.max(initial=0.0)),
+        switches=_switches(playback),
+        torque_over_effort=float((np.abs(playback.torques).max(axis=0) / robot.joint_limits.effort).max()),
+        fell=fell,
+        end=_end(playback, fell),
+        com_at_end=float(com[-1]),
+        attitude_at_end=float(attitude[-1]),
+    )
+
+
+def _end(playback: Playback, fell: float | None) -> str:
+    if fell is not None:
+        return "fell"
+    last = playback.contact_forces[-100:, :, 2].sum(axis=1).mean()
+    if last > TOUCHING:
+        return "stands"
+    return "hovers" if np.linalg.norm(playback.qvel[-1, :3]) < 0.2 else "in the air"
+
+
+def _rotations(qpos: Array) -> Array:
+    w, x, y, z = qpos[:, 3:7].T
+    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]  # fmt: skip
+    return np.array(rows).transpose(2, 0, 1)
+
+
+def _switches(playback: Playback) -> tuple[Switch, ...]:
+    """Return every planned touch-down and lift-off with the simulated one of the same kind that is nearest in time."""
+    found = []
+    feet = dict.fromkeys(contact.foot for contact in playback.robot.contacts)
+    for foot in feet:
+        own = [index for index, contact in enumerate(playback.robot.contacts) if contact.foot == foot]
+        times = playback.time
+        planned = _edges(times, playback.reference.contact_forces[:, own, 2].sum(axis=1) > TOUCHING)
+        simulated = _edges(times, np.linalg.norm(playback.contact_forces[:, own].sum(axis=1), axis=1) > TOUCHING)
+        for time, touches in planned:
+            others = [other for other, kind in simulated if kind == touches]
+            nearest = min(others, key=lambda other: abs(other - time)) if others else None
+            found.append(Switch(foot=foot, touches=touches, planned=time, simulated=nearest))
+    return tuple(sorted(found, key=lambda switch: switch.planned))
+
+
+def _edges(times: Array, stands: Array) -> list[tuple[float, bool]]:
+    """Return when a foot begins to stand (True) or to float (False), without blinks."""
+    edges = (np.flatnonzero(np.diff(stands.astype(int))) + 1).tolist()
+    kept: list[int] = []
+    for edge in edges:
+        if kept and times[edge] - times[kept[-1]] < BLINK:
+            kept.pop()
+        else:
+            kept.append(edge)
+    return [(float(times[edge]), bool(stands[edge])) for edge in kept]
+
+
+def simulated_trajectory(playback: Playback) -> Trajectory:
+    """Return the motion at the knots of the plan, under the plan's scenario, to be drawn beside it.
+
+    Rates are backward differences and contact forces and throttles means over the interval before each knot.
+    """
+    robot, plan = playback.robot, playback.plan
+    grid = plan.time - plan.time[0]
+    rows = np.clip(np.searchsorted(playback.time, grid - 1e-9), 0, playback.time.size - 1)
+    qpos, qvel = playback.qpos[rows].T, playback.qvel[rows].T
+    arrays: dict[str, Any] = {
+        "base_position": qpos[:3],
+        "base_quaternion_xyzw": qpos[[4, 5, 6, 3]],
+        "joint_positions": qpos[7:],
+        "base_linear_velocity": qvel[:3],
+        "base_angular_velocity": qvel[3:6],
+        "joint_velocities": qvel[6:],
+        "com_position": playback.com[rows].T,
+        "contact_forces": _means(playback.contact_forces.reshape(playback.time.size, -1), rows),
+        "thrust": playback.thrust[rows].T,
+        "thrust_rate": playback.thrust_rate[rows].T,
+        "throttle": _means(playback.throttle, rows),
+    }
+    motion = replace(plan, scenario=f"{plan.scenario} in MuJoCo", **arrays)
+    poses = np.hstack(list(base_poses(motion)))
+    points = contact_points(robot, motion)
+    momenta = np.array(robot.kindyn.centroidal_momentum_fun().map(grid.size)(poses, qpos[7:], qvel[:6], qvel[6:]))
+    arrays = {
+        "com_velocity": momenta[:3] / robot.mass,
+        "angular_momentum": momenta[3:],
+        "contact_positions": points.transpose(0, 2, 1).reshape(-1, grid.size),
+    }
+    arrays |= {
+        "com_acceleration": _rates(arrays["com_velocity"], grid),
+        "angular_momentum_rate": _rates(arrays["angular_momentum"], grid),
+        "contact_force_rates": _rates(motion.contact_forces, grid),
+        "thrust_acceleration": _rates(motion.thrust_rate, grid),
+    }
+    return replace(motion, **arrays)
+
+
+def _rates(values: Array, grid: Array) -> Array:
+    """Return backward differences, zero at the first knot."""
+    return np.asarray(np.diff(values, axis=1, prepend=values[:, :1]) / np.diff(grid, prepend=grid[0] - 1.0))
+
+
+def _means(values: Array, rows: Array) -> Array:
+    """Return the means over the steps up to each of `rows` since the one before, (columns, rows)."""
+    starts = np.concatenate([[0], rows[:-1]])
+    means = [values[start : max(end, start + 1)].mean(axis=0) for start, end in zip(starts, rows, strict=True)]
+    return np.array(means).reshape(len(rows), values.shape[1]).T

@@ -1,0 +1,187 @@
+"""A small stabiliser: what thrusts, loaded contact points and joints add to the plan to bring its momentum back.
+
+Wanted is a change of the momentum's rate, with starred the plan and I the robot's inertia about its CoM:
+
+    Δl̇ = m (K_x (x* − x) + D_x (ẋ* − ẋ)),   Δḣω = I K_R Log(R* Rᵀ) + D_h (hω* − hω).
+
+Each of three stages takes what the one before leaves, by least squares: z minimises ‖W (A z − Δ)‖² + ‖z / σ‖².
+
+1. Thrusts, which are slow. A jet whose throttle is at its end keeps the thrust that it has.
+2. Forces at the contact points that the plan loads and that touch; they stay inside the friction pyramid.
+3. Joints between base and jets, which turn and shift the thrusts. They count the less the more the feet carry.
+
+In flight Δ is about the CoM, and R* leans towards the wanted horizontal force, as a quadrotor's does. While a foot
+stands, stages 1 and 3 look only at the moment about the planned centre of pressure: about it the ground cannot help.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from multimodal_to.models.robot import Robot
+from multimodal_to.simulation.model import SimulationModel, mujoco_module
+from multimodal_to.simulation.reference import Reference
+from multimodal_to.trajectory import Array
+
+COM_STIFFNESS, COM_DAMPING = 6.0, 5.0  # K_x [1/s²], D_x [1/s]
+ATTITUDE_STIFFNESS, ATTITUDE_DAMPING = 16.0, 8.0  # K_R [1/s²], D_h [1/s]
+LEAN_MAX = 0.05  # [rad]
+THRUST_SPREAD = 20.0  # σ of a thrust [N]
+LOAD_SPREAD = 0.5  # σ of a contact force, as a share of the planned load of its point [1]
+JOINT_SPREAD = 0.1  # σ of a joint in flight [rad]
+JOINT_MAX = 0.3  # how far a joint leaves the plan [rad]
+LOADED = 1.0  # a contact point that the plan loads with more counts as one that stands [N]
+# Weights of the horizontal forces, the vertical one [1/N], and the moments [1/(N m)].
+THRUST_WEIGHTS = np.array([0.3, 0.3, 1.0, 5.0, 5.0, 5.0])
+FORCE_WEIGHTS = np.array([1.0, 1.0, 1.0, 5.0, 5.0, 5.0])
+JOINT_WEIGHTS = np.array([1.0, 1.0, 0.3, 5.0, 5.0, 5.0])
+_MOMENTS = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Correction:
+    """What is added to the plan."""
+
+    thrust: Array  # ΔT [N], (jets,)
+    contact_forces: Array  # Δf in world axes [N], (contacts, 3)
+    joints: Array  # Δs [rad], (n,)
+
+    @classmethod
+    def none(cls, robot: Robot) -> Correction:
+        """Return what adds nothing."""
+        return cls(
+            thrust=np.zeros(len(robot.jets)),
+            contact_forces=np.zeros((len(robot.contacts), 3)),
+            joints=np.zeros(len(robot.joint_names)),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Turbines:
+    """The jets as they are: thrusts [N], and whose throttle can go no farther; (jets,) each."""
+
+    thrust: Array
+    at_most: NDArray[np.bool_]
+    at_least: NDArray[np.bool_]
+
+
+def correct(
+    simulation: SimulationModel, data: Any, plan: Reference, step: int, turbines: Turbines, inertia: Array,
+    friction: float,
+) -> Correction:  # fmt: skip
+    """Return what to add to step `step` of the plan in the state of `data`, whose subtree velocities are known."""
+    robot = simulation.robot
+    com, points = data.subtree_com[1], data.geom_xpos[simulation.points]
+    loads = np.maximum(plan.contact_forces[step][:, 2], 0.0)
+    standing = np.flatnonzero((loads > LOADED) & np.isin(simulation.points, data.contact.geom))
+    load = float(loads[standing].sum())
+    free = max(0.0, 1.0 - load / robot.weight)
+    wanted = _wanted(simulation, data, plan, step, inertia, free)
+
+    origin = loads[standing] @ points[standing] / load if standing.size else com
+    rows = _MOMENTS if standing.size else np.ones(6)
+    about = wanted.copy()
+    about[3:] += np.cross(com - origin, wanted[:3])
+    thrust, missing = _thrusts(simulation, data, about, origin, turbines, plan.thrust[step], THRUST_WEIGHTS * rows)
+
+    forces = np.zeros((len(robot.contacts), 3))
+    if standing.size:
+        lacking = missing.copy()
+        lacking[3:] += np.cross(origin - com, missing[:3])
+        forces[standing] = _contact_forces(
+            plan.contact_forces[step][standing], points[standing] - com, lacking, friction
+        )
+    joints = np.zeros(len(robot.joint_names))
+    if robot.jets and free > 0.0:
+        effect = _effect_of_joints(simulation, data, origin, turbines.thrust, stands=bool(standing.size))
+        joints = _ridge(effect, missing, np.full(joints.size, free * JOINT_SPREAD), JOINT_WEIGHTS * rows)
+    return Correction(thrust=thrust, contact_forces=forces, joints=np.clip(joints, -JOINT_MAX, JOINT_MAX))
+
+
+def rotation_vector(rotation: Array) -> Array:
+    """Return Log R [rad], (3,)."""
+    mujoco = mujoco_module()
+    quaternion, vector = np.zeros(4), np.zeros(3)
+    mujoco.mju_mat2Quat(quaternion, rotation.ravel())
+    mujoco.mju_quat2Vel(vector, quaternion, 1.0)
+    return vector
+
+
+def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, inertia: Array, free: float) -> Array:
+    """Return Δl̇ [N] and Δḣω [N m] about the CoM, (6,)."""
+    robot = simulation.robot
+    away, slow = plan.com[step] - data.subtree_com[1], plan.com_velocity[step] - data.subtree_linvel[1]
+    linear = robot.mass * (COM_STIFFNESS * away + COM_DAMPING * slow)
+    carried = float(np.clip(plan.thrust[step] @ _axes(simulation, data)[:, 2] / robot.weight, 0.0, 1.0))
+    lean = free * carried * np.cross([0.0, 0.0, 1.0], linear) / robot.weight
+    lean *= min(1.0, LEAN_MAX / max(float(np.linalg.norm(lean)), 1e-9))
+    turn = lean + rotation_vector(plan.rotation[step] @ data.xmat[1].reshape(3, 3).T)  # both small
+    spin = plan.angular_momentum[step] - data.subtree_angmom[1]
+    return np.concatenate([linear, ATTITUDE_STIFFNESS * inertia @ turn + ATTITUDE_DAMPING * spin])
+
+
+def _axes(simulation: SimulationModel, data: Any) -> Array:
+    """Return where each thrust points, (jets, 3): −z of the jet's frame."""
+    return np.asarray(-data.site_xmat[simulation.jets].reshape(-1, 3, 3)[:, :, 2])
+
+
+def _thrusts(
+    simulation: SimulationModel, data: Any, wanted: Array, origin: Array, turbines: Turbines, planned: Array,
+    weights: Array,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return ΔT, and what the thrusts as they are leave of the wanted wrench about `origin`."""
+    axes = _axes(simulation, data)
+    wrenches = np.vstack([axes.T, np.cross(data.site_xpos[simulation.jets] - origin, axes).T])
+    off, spread = turbines.thrust - planned, np.full(len(axes), THRUST_SPREAD)
+    change = _ridge(wrenches, wanted, spread, weights)
+    stuck = (turbines.at_most & (change > off)) | (turbines.at_least & (change < off))
+    if stuck.any():
+        others = _ridge(wrenches * ~stuck, wanted - wrenches @ (off * stuck), spread, weights)
+        change = np.where(stuck, change, others)
+    return change, wanted - wrenches @ off
+
+
+def _contact_forces(planned: Array, arms: Array, wanted: Array, friction: float) -> Array:
+    """Return Δf of contact points with planned forces and arms from the CoM, (points, 3)."""
+    wrenches = np.hstack([np.vstack([np.eye(3), _skew(arm)]) for arm in arms])
+    spread = (LOAD_SPREAD * planned[:, 2:] * [friction, friction, 1.0]).ravel()
+    total = planned + _ridge(wrenches, wanted, spread, FORCE_WEIGHTS).reshape(-1, 3)
+    total[:, 2] = np.maximum(total[:, 2], 0.0)
+    reach = friction * total[:, 2:]
+    total[:, :2] = np.clip(total[:, :2], -reach, reach)
+    return np.asarray(total - planned)
+
+
+def _effect_of_joints(simulation: SimulationModel, data: Any, origin: Array, thrust: Array, *, stands: bool) -> Array:
+    """Return ∂w/∂s, (6, n): how joints above the base move the wrench of the thrusts, and the weight where it stands.
+
+    With thrust f at p: ∂f = ω × f, and the moment (p − o) × f changes with all three; o is the CoM in flight.
+    """
+    mujoco, model = mujoco_module(), simulation.model
+    linear, angular, of_com = (np.zeros((3, model.nv)) for _ in range(3))
+    mujoco.mj_jacSubtreeCom(model, data, of_com, 1)
+    effect, moves = np.zeros((6, model.nv)), np.zeros(model.nv, dtype=bool)
+    for site, force in zip(simulation.jets, _axes(simulation, data) * thrust[:, None], strict=True):
+        mujoco.mj_jacSite(model, data, linear, angular, site)
+        turned = -_skew(force) @ angular
+        effect[:3] += turned
+        effect[3:] += _skew(data.site_xpos[site] - origin) @ turned - _skew(force) @ (linear - (not stands) * of_com)
+        moves |= angular.any(axis=0)
+    if stands:
+        effect[3:] -= _skew(simulation.robot.mass * simulation.robot.gravity) @ of_com
+    return np.asarray((effect * moves)[:, simulation.joint_velocities])
+
+
+def _ridge(matrix: Array, target: Array, spread: Array, weights: Array) -> Array:
+    """Return z of least ‖W (A z − b)‖² + ‖z / σ‖², by the (6, 6) system of its dual."""
+    scaled = weights[:, None] * matrix * spread
+    return np.asarray(spread * (scaled.T @ np.linalg.solve(scaled @ scaled.T + np.eye(6), weights * target)))
+
+
+def _skew(vector: Array) -> Array:
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
