@@ -84,6 +84,12 @@ def test_every_published_figure_is_of_a_bundled_scenario():
     assert {published.scenario for published in PUBLISHED} <= set(mt.scenarios.SCENARIOS)
 
 
+def test_a_row_of_which_nothing_is_known_is_left_out(run):
+    jump = replace(run, name="jump")  # of the paper's jump only the solver's figures are known
+    assert [row[0] for row in table([jump], SOLVES).rows] == ["jump", "jump, paper"]
+    assert [row[0] for row in table([jump], AUDITS).rows] == ["jump"]
+
+
 def test_the_markdown_has_rows_of_equal_length(run):
     lines = [line for line in markdown([run]).splitlines() if line.startswith("|")]
     assert len(lines) == 2 * (2 + 2)

@@ -210,7 +210,8 @@ def reproduce_scenarios(
             break
     for columns in (SOLVES, AUDITS):
         results = table([*runs, *files], columns)
-        drawn = Table(*results.titles, box=None, pad_edge=False)
+        others = [Column(title, overflow="fold") for title in results.titles[1:]]
+        drawn = Table(Column(no_wrap=True), *others, box=None, pad_edge=False)
         for cells in results.rows:
             drawn.add_row(*cells)
         _out.print(drawn)

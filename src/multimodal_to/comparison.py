@@ -74,7 +74,7 @@ SOLVES = (
 """How the solve went and what motion came out."""
 
 AUDITS = (
-    _worst("force × height [N m]", "normal force × height", ".4f", lambda paper: _number(paper.force_height, ".3f")),
+    _worst("force × height [N m]", "normal force × height", "z.4f", lambda paper: _number(paper.force_height, ".3f")),
     Column(
         title="slip under load [mm]",
         of_run=lambda run: f"{1e3 * run.report['slip under load'].worst:.2f}",
@@ -97,7 +97,10 @@ paper's rows are its published figures and an audit of its published data, not r
 
 
 def table(runs: Sequence[Run], columns: Sequence[Column]) -> ResultsTable:
-    """Return a table of runs; below those that were solved here, the paper's and published files of that scenario."""
+    """Return a table of runs; below those that were solved here, the paper's and published files of that scenario.
+
+    A row of which nothing is known is left out.
+    """
     solved, files = [run for run in runs if run.solution], [run for run in runs if not run.solution]
     rows = []
     for run in solved:
@@ -110,7 +113,8 @@ def table(runs: Sequence[Run], columns: Sequence[Column]) -> ResultsTable:
         rows += [_of_file(file, columns) for file in files if file.name == run.name]
     names = {run.name for run in solved}
     rows += [_of_file(file, columns) for file in files if file.name not in names]
-    return ResultsTable(titles=("", *(column.title for column in columns)), rows=tuple(rows))
+    known = tuple(row for row in rows if set(row[1:]) != {UNKNOWN})
+    return ResultsTable(titles=("", *(column.title for column in columns)), rows=known)
 
 
 def _of_file(run: Run, columns: Sequence[Column]) -> tuple[str, ...]:
