@@ -89,9 +89,11 @@ def test_the_jump_leaves_the_ground_with_both_feet_and_lands_on_both(jump):
         assert carried[carried > phase[1]].min() - phase[1] <= 2.001 * step
 
 
-def test_the_jump_ends_near_the_posture_it_started_in(jump):
+def test_the_jump_ends_where_and_as_it_started(jump):
     joints = jump.trajectory.joint_positions
-    assert np.abs(joints[:, -1] - joints[:, 0]).max() < 0.15
+    assert np.abs(joints[:, -1] - joints[:, 0]).max() < 0.02
+    points = jump.points[:, [0, -1], :2]
+    assert np.abs(points[:, 1] - points[:, 0]).max() < 0.02  # and where it stood
 
 
 def test_take_off_and_landing_are_one_motion(ironcub, run_example):

@@ -113,8 +113,8 @@ def jump() -> Scenario:
     """Return the jump without thrust: above 0.75 m at mid-horizon and back at the start posture.
 
     It asks for more than the robot has: from nearly straight legs the CoM has to fly 0.18 m up. The audit holds the
-    legs' torques, and the wrench on the base that a step of some 0.04 s leaves unexplained, to the allowances below. With
-    the paper's weights it lands turned by half a radian and one foot before the other.
+    legs' torques, and the wrench on the base that a step of some 0.04 s leaves unexplained, to the allowances below.
+    With the paper's weights it lands turned by half a radian and one foot before the other.
     """
     return Scenario(
         name="jump",
