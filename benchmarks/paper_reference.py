@@ -47,13 +47,20 @@ from rich.table import Column, Table
 
 from multimodal_to import Robot, Trajectory, load_robot
 from multimodal_to.adam import quaternion
-from multimodal_to.trajectory import QUANTITIES
+from multimodal_to.trajectory import QUANTITIES, Quantity
 
 SHORT = 20  # iterations of --short
 NEAR = 1e-3  # how exactly the start is met, and the base upright at the end
 UPRIGHT = cs.DM([0, 0, 0, 1])
 CONTACT_REACH = cs.DM([0.3, 0.3, 0.6])  # from the CoM [m]
 JET_REACH = 0.5  # from the CoM [m]
+VARIABLES = {
+    **QUANTITIES,
+    "complementarity_slack": Quantity(rows=1, of="contact", unit="N m", meaning="ε_n, bound of height × normal force"),
+    "sliding_slack": Quantity(rows=1, of="contact", unit="N m", meaning="ε_t, bound of slip × normal force"),
+}
+"""The decision variables of a knot: all quantities of a trajectory, and the slacks."""
+
 SCALES = {
     "joint_positions": 2.0,
     "joint_velocities": 7.0,
@@ -175,7 +182,7 @@ class Transcription:
             "thrust": 30.0,
         }
         variables = {}
-        for name, quantity in QUANTITIES.items():
+        for name, quantity in VARIABLES.items():
             rows, scale = quantity.rows * sizes[quantity.of], SCALES.get(name, 1.0)
             if rows:
                 value = np.broadcast_to(guess.get(name, 0.0), (rows, count))
@@ -326,7 +333,8 @@ class Transcription:
 
     def trajectory(self, name: str) -> Trajectory:
         """Return the last iterate, to save and audit."""
-        values = {key: np.reshape(self.opti.debug.value(value), value.shape) for key, value in self.variables.items()}
+        known = {name: self.variables[name] for name in QUANTITIES}
+        values = {key: np.reshape(self.opti.debug.value(value), value.shape) for key, value in known.items()}
         robot: Robot = self.robot
         return Trajectory(
             robot=robot.name, scenario=name, joint_names=robot.joint_names, contact_names=robot.contact_names,
