@@ -12,7 +12,7 @@ import multimodal_to
 ROOT = Path(multimodal_to.__file__).parent
 FLOORS = [
     {"errors", "published"},
-    {"writing"},
+    {"reading", "writing"},
     {"trajectory"},
     {"resampling"},
     {"adam"},

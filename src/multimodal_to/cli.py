@@ -293,9 +293,7 @@ def replay(
     wanted = {".html": html, ".png": snapshots, ".gif": gif, ".mp4": mp4}
     targets = {suffix: path for suffix, path in wanted.items() if path is not None}
     for suffix, path in targets.items():
-        if path.suffix.lower() != suffix:
-            raise OutputError(f"'{path}' is no {suffix}")
-        _writable(path.parent)
+        _writable_file(path, suffix)
     from multimodal_to.replay import show, write_gif, write_html, write_mp4, write_snapshots
 
     write = {
@@ -331,9 +329,7 @@ def report_file(
     """
     the_robot, trajectory = _load(file, robot)
     target = output or file.with_suffix(".html")
-    if target.suffix.lower() != ".html":
-        raise OutputError(f"'{target}' is no .html")
-    _writable(target.parent)
+    _writable_file(target, ".html")
     from multimodal_to.report import write_report
 
     _out.print(f"wrote {write_report(the_robot, trajectory, target, meshes=meshes)}", soft_wrap=True)
@@ -355,9 +351,7 @@ def export_file(
     the_robot, trajectory = _load(file, robot)
     suffix, write = EXPORTS[to]
     target = output or (file.with_stem(f"{file.stem}-{to}") if suffix == ".npz" else file.with_suffix(suffix))
-    if target.suffix.lower() != suffix:
-        raise OutputError(f"'{target}' is no {suffix}")
-    _writable(target.parent)
+    _writable_file(target, suffix)
     _out.print(f"wrote {write(the_robot, trajectory, target)}", soft_wrap=True)
 
 
@@ -482,6 +476,13 @@ def _writable(folder: Path) -> Path:
     except OSError as error:
         raise OutputError(f"cannot write to the folder '{folder}': {error.strerror or error}") from error
     return folder
+
+
+def _writable_file(path: Path, suffix: str) -> None:
+    """Make sure that a file has its suffix and that its folder can be written to; the folder is made if missing."""
+    if path.suffix.lower() != suffix:
+        raise OutputError(f"'{path}' is no {suffix}")
+    _writable(path.parent)
 
 
 def _describe(report: Audit) -> str:

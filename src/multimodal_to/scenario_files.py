@@ -17,6 +17,7 @@ import tomli_w
 from multimodal_to.errors import MultimodalError, OutputError, ScenarioError
 from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.ocp.scenario_data import from_dict, to_dict
+from multimodal_to.reading import read_toml
 from multimodal_to.scenarios import find
 
 
@@ -27,12 +28,7 @@ def load(path: str | os.PathLike[str]) -> Scenario:
         ScenarioError: the file is missing or broken, a key is unknown or missing, or a value is wrong.
     """
     source = Path(path)
-    try:
-        table = tomllib.loads(source.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScenarioError(f"cannot read '{source}': {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"'{source}' is not valid TOML: {error}") from error
+    table = read_toml(source, ScenarioError)
     try:
         return _scenario(table, source.stem)
     except MultimodalError as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from multimodal_to.adam import KinDynComputations
 from multimodal_to.errors import ModelError, MultimodalError, unknown
 from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import Jet, JetModel
+from multimodal_to.reading import read_toml
 
 Array = NDArray[np.float64]
 
@@ -129,12 +129,7 @@ def load_robot(robot: str | os.PathLike[str]) -> Robot:
     if not folder.is_dir():
         raise ModelError(f"{unknown('robot', str(robot), bundled)}; nor is there a folder of that name")
     path = folder / ROBOT_FILE
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ModelError(f"cannot read '{path}': {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ModelError(f"'{path}' is not valid TOML: {error}") from error
+    table = read_toml(path, ModelError)
     try:
         return _robot(_Table(table, "the top level"), folder)
     except MultimodalError as error:

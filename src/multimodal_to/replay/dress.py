@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import metadata
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.errors import ModelError, unknown
+from multimodal_to.reading import read_toml
 from multimodal_to.replay.meshes import package_file
 from multimodal_to.trajectory import Array
 
@@ -87,8 +87,8 @@ def read_dress(folder: Path) -> Dress | None:
     path = folder / DRESS_FILE
     if not path.is_file():
         return None
+    table = read_toml(path, ModelError)
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
         package = str(table["package"])
         urdf = package_file(package, str(table["urdf"]))
         if urdf is None:
@@ -102,8 +102,6 @@ def read_dress(folder: Path) -> Dress | None:
         )
     except KeyError as error:
         raise ModelError(f"'{path}' lacks {error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ModelError(f"'{path}' is not valid TOML: {error}") from error
 
 
 def _garment(entry: Mapping[str, Any]) -> Garment:
