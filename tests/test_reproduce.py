@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 import multimodal_to as mt
-from multimodal_to import cli
+from multimodal_to.cli import app, solving
 from multimodal_to.comparison import AUDITS, SOLVES, markdown, table
 from multimodal_to.errors import TrajectoryError
 from multimodal_to.importing import COMPUTED
@@ -99,9 +99,9 @@ def test_the_markdown_has_rows_of_equal_length(run):
 
 def test_the_command_solves_writes_and_leaves_with_zero_when_all_holds(tmp_path, monkeypatch, bare):
     short = replace(mt.scenarios.take_off(), knots=35, interval_min=0.2, interval_max=0.2)
-    monkeypatch.setattr(cli, "find", {"take-off": short}.__getitem__)
+    monkeypatch.setattr(solving, "find", {"take-off": short}.__getitem__)
     arguments = ["reproduce", "take-off", "--output", str(tmp_path), "--published", str(bare)]
-    result = CliRunner().invoke(cli.app, arguments, env={"COLUMNS": "200"})
+    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
     assert result.exit_code == 0, result.output
     assert {"trajectory.npz", "report.html", "forces.png"} <= {path.name for path in tmp_path.glob("take-off/*")}
     written = (tmp_path / "table.md").read_text(encoding="utf-8")

@@ -1,0 +1,54 @@
+"""The command line, `multimodal-to`: the only part of the library that prints.
+
+Exit status: 0 when done, 1 when a solve ended without an answer, an audit found something or a simulated
+robot fell, 2 on bad input.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from importlib.metadata import version
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+# They register their commands, in this order.
+# isort: off
+from multimodal_to.cli import solving, showing, judging  # noqa: F401
+
+# isort: on
+from multimodal_to.cli.common import app, out
+from multimodal_to.errors import MultimodalError
+
+__all__ = ["app", "main"]
+
+
+def main() -> None:
+    """Run the command line; errors of the library end in one sentence and exit status 2."""
+    warnings.showwarning = _show_warning  # type: ignore[assignment]
+    try:
+        app()
+    except MultimodalError as error:
+        Console(stderr=True, highlight=False).print(f"error: {error}", markup=False, soft_wrap=True)
+        sys.exit(2)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        out.print(f"multimodal-to {version('multimodal-to')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    show_version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and leave.")
+    ] = False,
+) -> None:
+    pass
+
+
+def _show_warning(message: Warning | str, *_: object) -> None:
+    Console(stderr=True, highlight=False).print(f"warning: {message}", markup=False, soft_wrap=True)

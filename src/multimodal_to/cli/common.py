@@ -1,0 +1,84 @@
+"""What the commands share: the application, its options, and how files are found and written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from multimodal_to.audit import Audit
+from multimodal_to.errors import InputError, OutputError
+from multimodal_to.importing import import_arrays
+from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.ocp.scenario import Scenario
+from multimodal_to.scenario_files import change, load
+from multimodal_to.scenarios import find
+from multimodal_to.trajectory import Trajectory, read_archive
+
+app = typer.Typer(
+    name="multimodal-to",
+    help="Whole-body trajectory optimisation of robots that walk and fly.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+out = Console(highlight=False)
+
+File = Annotated[Path, typer.Argument(help="Trajectory file, as `solve` writes it.")]
+ScenarioName = Annotated[str, typer.Argument(help="Scenario, as `list` shows it, or a TOML file of one.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in --set final_com_height=0.8; repeatable."),
+]
+RobotOption = Annotated[str, typer.Option("--robot", help="Bundled robot by name, or a robot's folder.")]
+
+
+def chosen(name: str, settings: list[str] | None) -> Scenario:
+    """Return a bundled scenario or that of a file, with the changes asked for."""
+    return change(load(name) if name.endswith(".toml") else find(name), settings or ())
+
+
+def loaded(file: Path, robot: str) -> tuple[Robot, Trajectory]:
+    """Return a trajectory with its robot; a file of bare arrays needs the robot named."""
+    if robot and "format_version" not in read_archive(file):
+        the_robot = load_robot(robot)
+        return the_robot, import_arrays(the_robot, file)
+    trajectory = Trajectory.load(file)
+    return load_robot(robot or trajectory.robot).with_jets(trajectory.jet_names), trajectory
+
+
+def writable(folder: Path) -> Path:
+    """Make a folder if it is missing and make sure that files can be written there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OutputError(f"cannot write to the folder '{folder}': {error.strerror or error}") from error
+    return folder
+
+
+def writable_file(path: Path, suffix: str) -> None:
+    """Make sure that a file has its suffix and that its folder can be written to; the folder is made if missing."""
+    if path.suffix.lower() != suffix:
+        raise OutputError(f"'{path}' is no {suffix}")
+    writable(path.parent)
+
+
+def option_numbers(option: str, text: str) -> list[float]:
+    """Return the numbers of an option that are written with commas between them."""
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError as error:
+        raise InputError(f"{option} is '{text}'; expected numbers with commas between them") from error
+
+
+def described(report: Audit) -> str:
+    """Return the figures of an audit that are no verdicts, as a sentence."""
+    return (
+        f"{report.duration:.2f} s, longest flight {report.airborne:.2f} s, vertical thrust at the end "
+        f"{100 * report.final_thrust_over_weight:.2f} % of the weight"
+    )

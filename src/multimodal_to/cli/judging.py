@@ -1,0 +1,137 @@
+"""`audit`, `simulate` and `robot info`."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Column, Table
+
+from multimodal_to.adam.inspection import describe
+from multimodal_to.audit import Audit, audit
+from multimodal_to.cli.common import File, RobotOption, app, described, loaded, out, writable
+from multimodal_to.errors import OutputError
+from multimodal_to.models.robot import load_robot
+
+robot_app = typer.Typer(help="Look at robots.", no_args_is_help=True)
+app.add_typer(robot_app, name="robot")
+
+
+@app.command("audit")
+def audit_file(
+    file: File,
+    robot: RobotOption = "",
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON, for programs.")] = False,
+) -> None:
+    """Check from the file alone whether a trajectory is physically true and does what its scenario asks.
+
+    Exit status 0 only when every property holds, 1 when one does not.
+
+    With --robot it also takes bare arrays under the names of a trajectory file, as the paper's data can be had.
+
+    Example: multimodal-to audit results/take-off/trajectory.npz
+    """
+    report = audit(*loaded(file, robot))
+    if as_json:
+        typer.echo(json.dumps(_as_data(report), indent=2, ensure_ascii=False))
+        raise typer.Exit(0 if report.holds else 1)
+    narrow = [Column(title, no_wrap=True) for title in ("property", "worst", "limit", "unit", "knot")]
+    table = Table(*narrow, "where", Column(no_wrap=True), box=None, pad_edge=False)
+    for finding in report.findings:
+        verdict = "ok" if finding.holds else "FAILS"
+        table.add_row(finding.name, f"{finding.worst:.1e}", f"{finding.limit:.2g}", finding.unit, str(finding.knot),
+                      finding.body, verdict)  # fmt: skip
+    out.print(table)
+    out.print(described(report))
+    if report.scenario is None:
+        out.print(
+            "the file keeps no scenario: its start, end and ranges were not judged, the ground was taken as flat, and "
+            "the friction as the robot's own pyramid",
+            soft_wrap=True,
+        )
+    raise typer.Exit(0 if report.holds else 1)
+
+
+def _as_data(report: Audit) -> dict[str, Any]:
+    """Return an audit as what JSON can hold; a worst value that is not finite becomes null."""
+    return {
+        "holds": report.holds,
+        "scenario": None if report.scenario is None else report.scenario.name,
+        "duration": report.duration,
+        "airborne": report.airborne,
+        "final_thrust_over_weight": report.final_thrust_over_weight,
+        "findings": [
+            asdict(finding) | {"worst": finding.worst if math.isfinite(finding.worst) else None, "holds": finding.holds}
+            for finding in report.findings
+        ],
+    }
+
+
+@app.command()
+def simulate(
+    file: File,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Simulated trajectory to write. [FILE-simulated.npz]")
+    ] = None,
+    stabilise: Annotated[
+        bool, typer.Option(help="Let a small stabiliser correct thrusts, contact forces and joints.")
+    ] = True,
+    robot: RobotOption = "",
+) -> None:
+    """Play a trajectory back in MuJoCo, say how far it gets, and write what happened as a trajectory.
+
+    Exit status 0 when the robot stands or hovers at the end, 1 when not. Needs the extra `sim`.
+
+    Example: multimodal-to simulate results/take-off/trajectory.npz --output simulated.npz
+    """
+    target = output or file.with_stem(f"{file.stem}-simulated")
+    if target.suffix.lower() != ".npz":
+        raise OutputError(f"'{target}' is no .npz")
+    the_robot, plan = loaded(file, robot)
+    from multimodal_to import simulation
+
+    agreement = {
+        "at 100 random states": simulation.disagreement(the_robot, simulation.random_states(the_robot, 100)),
+        "along the plan": simulation.disagreement(the_robot, simulation.states_along(plan)),
+    }
+    writable(target.parent)
+    playback = simulation.play(the_robot, plan, stabilise=stabilise)
+    outcome = simulation.tracking(playback)
+    for where, difference in agreement.items():
+        out.print(f"inverse dynamics {where}: MuJoCo and RNEA differ by {difference:.1e} of the largest force",
+                   soft_wrap=True)  # fmt: skip
+    out.print(
+        f"largest errors over {plan.duration:.2f} s: CoM {100 * outcome.com:.1f} cm, base {outcome.attitude:.1f}°, "
+        f"joints {outcome.joint:.1f}° ({outcome.joint_name}), thrust {outcome.thrust:.1f} N; largest torque "
+        f"{100 * outcome.torque_over_effort:.0f} % of its joint's effort limit",
+        soft_wrap=True,
+    )
+    for switch in outcome.switches:
+        kind = "touch-down" if switch.touches else "lift-off"
+        happened = "never" if switch.simulated is None else f"{switch.simulated - switch.planned:+.2f} s"
+        out.print(f"{kind} of the {switch.foot} foot: planned at {switch.planned:.2f} s, simulated {happened}")
+    when = "" if outcome.fell is None else f" at {outcome.fell:.2f} s"
+    out.print(f"the robot {outcome.end}{when}; CoM error after the end "
+               f"{100 * outcome.com_at_end:.1f} cm, base {outcome.attitude_at_end:.1f}°", soft_wrap=True)  # fmt: skip
+    out.print(f"wrote {simulation.simulated_trajectory(playback).save(target)}", soft_wrap=True)
+    raise typer.Exit(0 if outcome.end in ("stands", "hovers") else 1)
+
+
+@robot_app.command("info")
+def robot_info(
+    path: Annotated[str, typer.Argument(help="URDF file, a robot's folder, or the name of a bundled robot.")],
+) -> None:
+    """Show a robot's tree, masses and frames, what was merged or locked, and what looks wrong.
+
+    Example: multimodal-to robot info ironcub
+    """
+    if Path(path).is_file():
+        description = describe(path)
+    else:
+        the_robot = load_robot(path)
+        description = describe(the_robot.urdf, the_robot.joint_names)
+    out.print(str(description), markup=False, soft_wrap=True)

@@ -1,0 +1,141 @@
+"""`plot`, `replay`, `report` and `export`."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from multimodal_to.cli.common import File, RobotOption, app, loaded, option_numbers, out, writable, writable_file
+from multimodal_to.errors import InputError, OutputError, unknown
+from multimodal_to.export import EXPORTS
+from multimodal_to.models.robot import load_robot
+from multimodal_to.trajectory import Trajectory
+
+
+@app.command()
+def plot(
+    files: Annotated[list[Path], typer.Argument(help="Trajectory files; several are drawn in one figure.")],
+    figure: Annotated[
+        str, typer.Option(help="forces, com, momentum, joints, torques, contacts, margins, or all of them.")
+    ] = "forces",
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Picture: .png, .svg or .pdf; of all, the start of the names. [FILE.png]"),
+    ] = None,
+    robot: RobotOption = "",
+) -> None:
+    """Plot a trajectory, or several to compare, with limits dashed and flight in red.
+
+    Example: multimodal-to plot results/take-off/trajectory.npz --figure com --output com.svg
+    """
+    from multimodal_to.plotting import FIGURES, SUFFIXES, save
+    from multimodal_to.plotting import plot as draw
+
+    target = output or files[0].with_suffix(".png")
+    if target.suffix.lower() not in SUFFIXES:
+        raise OutputError(f"'{target}' is no .png, .svg or .pdf")
+    if figure not in (*FIGURES, "all"):
+        raise InputError(unknown("figure", figure, (*FIGURES, "all")))
+    opened = [loaded(file, robot) for file in files]
+    the_robot = load_robot(robot or opened[0][1].robot)
+    trajectories = [trajectory for _, trajectory in opened]
+    writable(target.parent)
+    for name in FIGURES if figure == "all" else (figure,):
+        path = target.with_stem(f"{target.stem}-{name}") if figure == "all" else target
+        drawn = draw(name, the_robot, *trajectories, labels=_labels(files, trajectories))
+        out.print(f"wrote {save(drawn, path)}", soft_wrap=True)
+
+
+def _labels(files: list[Path], trajectories: list[Trajectory]) -> list[str]:
+    """Return a short name for each file: its scenario, or its path where two are of one scenario."""
+    scenarios = [trajectory.scenario for trajectory in trajectories]
+    return [
+        scenario if scenarios.count(scenario) == 1 else str(file)
+        for scenario, file in zip(scenarios, files, strict=True)
+    ]
+
+
+@app.command()
+def replay(
+    file: File,
+    html: Annotated[Path | None, typer.Option(help="Write a page that opens from disk, without a server.")] = None,
+    gif: Annotated[Path | None, typer.Option(help="Write a GIF that repeats.")] = None,
+    mp4: Annotated[Path | None, typer.Option(help="Write an MP4 film.")] = None,
+    snapshots: Annotated[Path | None, typer.Option(help="Write a PNG of the robot at several times.")] = None,
+    times: Annotated[str, typer.Option(help="Times of the snapshots [s], as 0,2.5,7.")] = "",
+    fps: Annotated[float | None, typer.Option(help="Frames a second. [GIF 12.5, MP4 25]")] = None,
+    meshes: Annotated[bool, typer.Option(help="Draw meshes where the robot has them.")] = True,
+    robot: RobotOption = "",
+) -> None:
+    """Replay a trajectory in the browser, live or as a page, or render it; GIF, MP4 and PNG need Chromium or Chrome.
+
+    Example: multimodal-to replay results/take-off/trajectory.npz --html take-off.html --gif take-off.gif
+    """
+    the_robot, trajectory = loaded(file, robot)
+    instants = option_numbers("--times", times) if times else None
+    wanted = {".html": html, ".png": snapshots, ".gif": gif, ".mp4": mp4}
+    targets = {suffix: path for suffix, path in wanted.items() if path is not None}
+    for suffix, path in targets.items():
+        writable_file(path, suffix)
+    from multimodal_to.replay import show, write_gif, write_html, write_mp4, write_snapshots
+
+    write = {
+        ".html": lambda path: write_html(the_robot, trajectory, path, meshes=meshes),
+        ".png": lambda path: write_snapshots(the_robot, trajectory, path, times=instants, meshes=meshes),
+        ".gif": lambda path: write_gif(the_robot, trajectory, path, rate=12.5 if fps is None else fps, meshes=meshes),
+        ".mp4": lambda path: write_mp4(the_robot, trajectory, path, rate=25.0 if fps is None else fps, meshes=meshes),
+    }
+    for suffix, path in targets.items():
+        out.print(f"wrote {write[suffix](path)}", soft_wrap=True)
+    if targets:
+        return
+    visualizer = show(the_robot, trajectory, meshes=meshes)
+    out.print(f"replaying at {visualizer.url()}; Ctrl-C ends", soft_wrap=True)
+    visualizer.open()
+    try:
+        while True:
+            time.sleep(1.0)
+    except KeyboardInterrupt:
+        out.print()
+
+
+@app.command("report")
+def report_file(
+    file: File,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write. [FILE.html]")] = None,
+    meshes: Annotated[bool, typer.Option(help="Draw meshes where the robot has them.")] = True,
+    robot: RobotOption = "",
+) -> None:
+    """Write one page with replay, figures, audit and scenario of a trajectory; it opens from disk and prints.
+
+    Example: multimodal-to report results/take-off/trajectory.npz --output take-off.html
+    """
+    the_robot, trajectory = loaded(file, robot)
+    target = output or file.with_suffix(".html")
+    writable_file(target, ".html")
+    from multimodal_to.report import write_report
+
+    out.print(f"wrote {write_report(the_robot, trajectory, target, meshes=meshes)}", soft_wrap=True)
+
+
+@app.command("export")
+def export_file(
+    file: File,
+    to: Annotated[str, typer.Option("--to", help="csv, mat, mujoco or pinocchio.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write. [FILE.csv and so on]")] = None,
+    robot: RobotOption = "",
+) -> None:
+    """Write a trajectory for another program, with names, units and conventions.
+
+    Example: multimodal-to export results/take-off/trajectory.npz --to mujoco --output take-off-mujoco.npz
+    """
+    if to not in EXPORTS:
+        raise InputError(unknown("export", to, EXPORTS))
+    the_robot, trajectory = loaded(file, robot)
+    suffix, write = EXPORTS[to]
+    target = output or (file.with_stem(f"{file.stem}-{to}") if suffix == ".npz" else file.with_suffix(suffix))
+    writable_file(target, suffix)
+    out.print(f"wrote {write(the_robot, trajectory, target)}", soft_wrap=True)

@@ -1,0 +1,173 @@
+"""`list`, `show`, `solve` and `reproduce`."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Column, Table
+
+from multimodal_to.audit import Audit, audit
+from multimodal_to.cli.common import RobotOption, ScenarioName, Settings, app, chosen, described, out, writable
+from multimodal_to.cli.progress import Progress
+from multimodal_to.errors import ScenarioError
+from multimodal_to.models.robot import load_robot
+from multimodal_to.ocp import Ipopt, Solution, build
+from multimodal_to.ocp import solve as run_solver
+from multimodal_to.ocp.scenario import Scenario
+from multimodal_to.ocp.scenario_data import stored, to_dict
+from multimodal_to.scenario_files import change, to_toml
+from multimodal_to.scenarios import SCENARIOS, find
+from multimodal_to.trajectory import Trajectory
+
+
+@app.command("list")
+def list_scenarios() -> None:
+    """List the bundled scenarios with their numbers."""
+    table = Table(Column(no_wrap=True), Column(), box=None, show_header=False, pad_edge=False)
+    for make in SCENARIOS.values():
+        scenario = make()
+        table.add_row(scenario.name, f"{scenario.title}\n{_numbers(scenario)}")
+    out.print(table)
+
+
+def _numbers(scenario: Scenario) -> str:
+    durations = dict.fromkeys(f"{scenario.knots * dt:g}" for dt in (scenario.interval_min, scenario.interval_max))
+    start, end = (" ".join(f"{number:g}" for number in com) for com in (scenario.initial_com, scenario.final_com))
+    middle = "" if scenario.mid_height_min is None else f"above {scenario.mid_height_min:g} m at mid-horizon, "
+    return (
+        f"{scenario.knots} knots, {' to '.join(durations)} s, CoM from {start} m ({scenario.start.value}) to {end} m "
+        f"({scenario.terminal.value}), {middle}jets {'on' if scenario.jets else 'off'}, "
+        f"ground: {to_dict(scenario)['surface']['kind']}"
+    )
+
+
+@app.command()
+def show(name: ScenarioName, settings: Settings = None) -> None:
+    """Print a scenario as TOML, complete; also the one that a trajectory file was solved from.
+
+    Example: multimodal-to show take-off > my_task.toml
+    """
+    scenario = stored(Trajectory.load(name)) if name.endswith(".npz") else chosen(name, None)
+    if scenario is None:
+        raise ScenarioError(f"'{name}' keeps no scenario")
+    out.print(to_toml(change(scenario, settings or ())), markup=False, soft_wrap=True, end="")
+
+
+@app.command()
+def solve(
+    name: ScenarioName,
+    settings: Settings = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder for the results; made if missing. [results/NAME]")
+    ] = None,
+    robot: RobotOption = "ironcub",
+    max_iterations: Annotated[int, typer.Option(help="Give up after so many iterations.")] = 1000,
+    time_limit: Annotated[float, typer.Option(help="Give up after so many seconds in the solver.")] = 3600.0,
+    warm_start: Annotated[
+        Path | None, typer.Option(help="Trajectory of a task much like this one to start from, for a faster answer.")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Solve a scenario; write the trajectory, its plot and its replay page.
+
+    Example: multimodal-to solve take-off --set final_com_height=0.8 --set weights.thrust=3 --output results/higher
+    """
+    scenario = chosen(name, settings)
+    solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit)
+    start = None if warm_start is None else Trajectory.load(warm_start)
+    folder = writable(output or Path("results") / scenario.name)
+    console = Console(highlight=False, quiet=quiet)
+    started = time.perf_counter()
+    problem = build(load_robot(robot), scenario)
+    the_robot = problem.robot  # with the jets that the scenario uses
+    console.print(
+        f"{scenario.title}: {the_robot.name}, {scenario.knots} knots, {problem.lower.size} variables, "
+        f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s",
+        soft_wrap=True,
+    )
+    with Progress(console) as progress:
+        solution = run_solver(problem, solver, progress, start=start)
+    report = audit(the_robot, solution.trajectory, scenario)
+    _summarise(console, solution, report)
+
+    from multimodal_to.plotting import plot_forces, save  # viewers take a second to import, other commands need none
+    from multimodal_to.replay import write_html
+
+    written = [solution.trajectory.save(folder / "trajectory.npz")]
+    written.append(save(plot_forces(the_robot, solution.trajectory), folder / "forces.png"))
+    written.append(write_html(the_robot, solution.trajectory, folder / "replay.html"))
+    for path in written:
+        console.print(f"wrote {path}", soft_wrap=True)
+    if not solution.status.solved:
+        raise typer.Exit(1)
+
+
+def _summarise(console: Console, solution: Solution, report: Audit) -> None:
+    name, violation, unit = solution.largest_violation
+    console.print(
+        f"{solution.status.value}: {solution.status.advice}\n"
+        f"{solution.iterations} iterations in {solution.solve_time:.1f} s, objective {solution.objective:.6g}, largest "
+        f"violation {violation:.1e} {unit} ({name})\n{described(report)}",
+        soft_wrap=True,
+    )
+    failed = [finding for finding in report.findings if not finding.holds]
+    for finding in failed:
+        console.print(
+            f"audit: {finding.name} is {finding.worst:.2e} {finding.unit} at knot {finding.knot} {finding.body}, "
+            f"more than {finding.limit:g}",
+            soft_wrap=True,
+        )
+    if not failed:
+        console.print(f"audit: all {len(report.findings)} properties hold")
+
+
+@app.command("reproduce")
+def reproduce_scenarios(
+    names: Annotated[list[str] | None, typer.Argument(help="Bundled scenarios; without, all.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; made if missing.")] = Path(
+        "results"
+    ),
+    published: Annotated[
+        Path | None, typer.Option(help="Folder of the paper's trajectories as bare arrays, to audit beside.")
+    ] = None,
+) -> None:
+    """Solve the bundled scenarios again and tabulate the answers beside the paper's figures.
+
+    For each, trajectory, figures and report go to a folder of its name; the tables go to table.md. Exit status 0 only
+    when every solve has an answer that passes the audit.
+
+    Example: multimodal-to reproduce take-off jump --output results
+    """
+    scenarios = [find(name) for name in names or SCENARIOS]
+    folders = [writable(output / scenario.name) for scenario in scenarios]
+    robot = load_robot("ironcub")
+
+    from multimodal_to.comparison import AUDITS, SOLVES, markdown, table
+    from multimodal_to.reproduce import read_published, reproduce, write_run
+    from multimodal_to.writing import write_text
+
+    files = [] if published is None else read_published(robot, published)
+    runs = []
+    for scenario, folder in zip(scenarios, folders, strict=True):
+        out.print(f"{scenario.name}: {scenario.title}")
+        with Progress(out) as progress:
+            run = reproduce(robot, scenario, progress=progress)
+        write_run(run, folder)
+        runs.append(run)
+        out.print(f"wrote {folder}", soft_wrap=True)
+        if progress.interrupted:
+            break
+    for columns in (SOLVES, AUDITS):
+        results = table([*runs, *files], columns)
+        others = [Column(title, overflow="fold") for title in results.titles[1:]]
+        drawn = Table(Column(no_wrap=True), *others, box=None, pad_edge=False)
+        for cells in results.rows:
+            drawn.add_row(*cells)
+        out.print(drawn)
+    out.print(f"wrote {write_text(output / 'table.md', markdown([*runs, *files]))}", soft_wrap=True)
+    if len(runs) < len(scenarios) or not all(run.holds for run in runs):
+        raise typer.Exit(1)
