@@ -73,6 +73,7 @@ def test_a_changed_scenario_is_solved_and_kept_in_the_file(tmp_path):
     "command",
     [
         (),
+        ("doctor",),
         ("solve",),
         ("reproduce",),
         ("plot",),

@@ -18,7 +18,7 @@ FLOORS = [
     {"adam"},
     {"models"},
     {"ocp"},
-    {"scenarios"},
+    {"scenarios", "doctor"},
     {"scenario_files", "derived", "terrain_mesh"},
     {"findings"},
     {"audit_task", "audit_thrust"},

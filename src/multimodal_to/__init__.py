@@ -1,12 +1,14 @@
 """Whole-body trajectory optimisation of robots that walk and fly.
 
 A `Robot` and a `Scenario` go into `build`; `solve` returns a `Solution` with a `Trajectory` and its own verdict;
-`audit`, `multimodal_to.plotting` and `multimodal_to.replay` need only the trajectory and the robot.
+`doctor` says before that what cannot work; `audit`, `multimodal_to.plotting` and `multimodal_to.replay` need only the
+trajectory and the robot.
 """
 
 from multimodal_to import scenario_files, scenarios
 from multimodal_to.adam import KinDynComputations
 from multimodal_to.audit import Audit, audit
+from multimodal_to.doctor import Diagnosis, doctor
 from multimodal_to.errors import MultimodalError
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot, load_robot
@@ -16,6 +18,7 @@ from multimodal_to.trajectory import Trajectory
 
 __all__ = [
     "Audit",
+    "Diagnosis",
     "FlatGround",
     "FrictionCone",
     "HeightField",
@@ -35,6 +38,7 @@ __all__ = [
     "Weights",
     "audit",
     "build",
+    "doctor",
     "load_robot",
     "scenario_files",
     "scenarios",

@@ -1,8 +1,10 @@
-"""`list`, `show`, `solve` and `reproduce`."""
+"""`list`, `show`, `doctor`, `solve` and `reproduce`."""
 
 from __future__ import annotations
 
+import json
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +15,8 @@ from rich.table import Column, Table
 from multimodal_to.audit import Audit, audit
 from multimodal_to.cli.common import RobotOption, ScenarioName, Settings, app, chosen, described, out, writable
 from multimodal_to.cli.progress import Progress
+from multimodal_to.doctor import Diagnosis, Severity, refusal
+from multimodal_to.doctor import doctor as examine
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import load_robot
 from multimodal_to.ocp import Ipopt, Solution, build
@@ -58,6 +62,50 @@ def show(name: ScenarioName, settings: Settings = None) -> None:
 
 
 @app.command()
+def doctor(
+    name: ScenarioName,
+    settings: Settings = None,
+    robot: RobotOption = "ironcub",
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON, for programs.")] = False,
+) -> None:
+    """Say in about a second whether a task can work at all, and what to change where it cannot.
+
+    Exit status 2 when it is hopeless, which `solve` refuses; warnings and notes leave 0.
+
+    Example: multimodal-to doctor take-off --set knots=20
+    """
+    the_robot = load_robot(robot)
+    if not name.endswith(".toml"):
+        find(name)  # a name that does not exist is no task
+    try:
+        diagnosis = examine(the_robot, chosen(name, settings))
+    except ScenarioError as error:  # there is no scenario to look at
+        diagnosis = refusal("scenario", error)
+    if as_json:
+        findings = [asdict(finding) | {"severity": finding.severity.value} for finding in diagnosis.findings]
+        data = {"task": name, "robot": the_robot.name, "hopeless": diagnosis.hopeless, "findings": findings}
+        typer.echo(json.dumps(data, indent=2, ensure_ascii=False))
+    else:
+        for finding in diagnosis.findings:
+            out.print(f"{finding.severity.value}: {finding}", markup=False, soft_wrap=True)
+        verdict = "refused" if diagnosis.hopeless else "nothing found that makes it hopeless"
+        counts = ", ".join(f"{severity.value}s: {len(diagnosis.of(severity))}" for severity in Severity)
+        out.print(f"{name}: {verdict} ({counts})", soft_wrap=True)
+    raise typer.Exit(2 if diagnosis.hopeless else 0)
+
+
+def _refuse_hopeless(diagnosis: Diagnosis, console: Console, force: bool) -> None:
+    """Print warnings, and errors to standard error; leave with exit status 2 after errors unless forced to go on."""
+    errors = diagnosis.of(Severity.ERROR)
+    for finding in errors:
+        Console(stderr=True, highlight=False).print(f"error: {finding}", markup=False, soft_wrap=True)
+    for finding in diagnosis.of(Severity.WARNING):
+        console.print(f"warning: {finding}", markup=False, soft_wrap=True)
+    if errors and not force:
+        raise typer.Exit(2)
+
+
+@app.command()
 def solve(
     name: ScenarioName,
     settings: Settings = None,
@@ -70,19 +118,24 @@ def solve(
     warm_start: Annotated[
         Path | None, typer.Option(help="Trajectory of a task much like this one to start from, for a faster answer.")
     ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Try a task that the doctor calls hopeless.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Solve a scenario; write the trajectory, its plot and its replay page.
+
+    The doctor looks at it first: a hopeless task is refused with exit status 2, and nothing is written.
 
     Example: multimodal-to solve take-off --set final_com_height=0.8 --set weights.thrust=3 --output results/higher
     """
     scenario = chosen(name, settings)
     solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit)
     start = None if warm_start is None else Trajectory.load(warm_start)
-    folder = writable(output or Path("results") / scenario.name)
     console = Console(highlight=False, quiet=quiet)
+    the_robot = load_robot(robot)
+    _refuse_hopeless(examine(the_robot, scenario), console, force)
+    folder = writable(output or Path("results") / scenario.name)
     started = time.perf_counter()
-    problem = build(load_robot(robot), scenario)
+    problem = build(the_robot, scenario)
     the_robot = problem.robot  # with the jets that the scenario uses
     console.print(
         f"{scenario.title}: {the_robot.name}, {scenario.knots} knots, {problem.lower.size} variables, "

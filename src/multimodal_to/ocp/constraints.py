@@ -18,8 +18,9 @@ from multimodal_to.models import contact
 from multimodal_to.models.centroidal import momentum_rate, thrust_force
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Posture, Robot
-from multimodal_to.models.terrain import Surface
+from multimodal_to.models.terrain import Remembered, Surface
 from multimodal_to.ocp.integrators import gap, rotation_gap
+from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.ocp.variables import CONTACT_REACH, JET_REACH, Knot
 
 
@@ -34,6 +35,19 @@ class World:
     complementarity_max: float  # ε_n [N m]
     sliding_max: float  # ε_t [N m]
     standing: Posture  # near home, with the CoM where the motion starts
+
+    @classmethod
+    def of(cls, robot: Robot, scenario: Scenario, standing: Posture) -> World:
+        """Return what a scenario says of the world; a friction that it leaves open is the robot's."""
+        return cls(
+            robot=robot,
+            surface=Remembered(scenario.surface),
+            friction=scenario.friction or robot.friction,
+            friction_cone=scenario.friction_cone,
+            complementarity_max=scenario.complementarity_max,
+            sliding_max=scenario.sliding_max,
+            standing=standing,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

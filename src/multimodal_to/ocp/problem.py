@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from multimodal_to.errors import InputError, ScenarioError
 from multimodal_to.models.robot import Posture, Robot
-from multimodal_to.models.terrain import Remembered
 from multimodal_to.ocp.boundary import set_boundary
 from multimodal_to.ocp.constraints import World
 from multimodal_to.ocp.guess import standing_posture, start_guess
 from multimodal_to.ocp.scenario import Scenario, Start, Terminal
 from multimodal_to.ocp.stages import NamedStage, collect
 from multimodal_to.ocp.transcription import Nlp, assemble
-from multimodal_to.ocp.variables import INTERVAL_SCALE, Layout, ranges
+from multimodal_to.ocp.variables import INTERVAL_SCALE, Bounds, Layout, ranges
 from multimodal_to.resampling import resample
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 
@@ -112,18 +111,8 @@ def build(robot: Robot, scenario: Scenario) -> Problem:
         raise ScenarioError(f"{robot.name} has no contact points to stand on")
     for group in scenario.weights.joint_velocities:
         robot.group_indices(group)
-    layout, bounds, standing = Layout.of(robot), ranges(robot, scenario), _standing(robot, scenario)
-    world = World(
-        robot=robot,
-        surface=Remembered(scenario.surface),
-        friction=scenario.friction or robot.friction,
-        friction_cone=scenario.friction_cone,
-        complementarity_max=scenario.complementarity_max,
-        sliding_max=scenario.sliding_max,
-        standing=standing,
-    )
-    stages = collect(world, scenario, layout, bounds)
-    set_boundary(bounds, robot, scenario, standing)
+    standing = _standing(robot, scenario)
+    layout, bounds, stages = formulate(robot, scenario, standing)
     nlp = assemble([named.stage for named in stages], layout.size, scenario.knots)
 
     scale = np.append(np.tile(layout.scale, scenario.knots + 1), INTERVAL_SCALE)
@@ -150,6 +139,23 @@ def build(robot: Robot, scenario: Scenario) -> Problem:
         guess=np.clip(guess, lower, upper),
         scale=scale,
     )
+
+
+def formulate(robot: Robot, scenario: Scenario, standing: Posture) -> tuple[Layout, Bounds, list[NamedStage]]:
+    """Return the variables with their bounds, and the rows and costs by stage, before anything is derived of them.
+
+    Args:
+        robot: with the jets that the scenario uses.
+        scenario: the task.
+        standing: posture in which the motion starts or, if it starts in the air, that it is pulled to.
+
+    Raises:
+        ScenarioError: what the start or the end holds is outside its range.
+    """
+    layout, bounds = Layout.of(robot), ranges(robot, scenario)
+    stages = collect(World.of(robot, scenario, standing), scenario, layout, bounds)
+    set_boundary(bounds, robot, scenario, standing)
+    return layout, bounds, stages
 
 
 def _standing(robot: Robot, scenario: Scenario) -> Posture:

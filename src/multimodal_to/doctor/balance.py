@@ -1,0 +1,110 @@
+"""Which forces hold a posture still: a linear programme over contact forces and thrusts, on the problem's own rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
+
+from multimodal_to.doctor.task import Task
+from multimodal_to.models.contact import FrictionCone
+from multimodal_to.models.robot import Posture
+from multimodal_to.ocp import constraints
+from multimodal_to.ocp.guess import base_transform, contact_positions
+from multimodal_to.ocp.variables import Knot
+
+Array = NDArray[np.float64]
+
+_LEVER = 0.3
+"""What a residual moment is divided by to weigh it against a residual force [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Residual:
+    """What the forces at hand leave over of weight and moment."""
+
+    force: float  # [N]
+    moment: float  # about the CoM [N m]
+    carried: float  # the weight [N]
+
+    @property
+    def nothing(self) -> bool:
+        """Return whether the posture is held still, up to a ten-thousandth of the weight."""
+        return max(self.force, self.moment / _LEVER) <= 1e-4 * self.carried
+
+    def __str__(self) -> str:
+        return f"{self.force:.3g} N and {self.moment:.3g} N m"
+
+
+def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, moments: bool = True) -> Residual:
+    """Return the least residual, ‖force‖₁ + ‖moment‖₁ / _LEVER, of a posture at rest.
+
+    Contact forces lie in the friction pyramid, which holds the second-order cone.
+
+    Args:
+        task: robot and scenario.
+        posture: where everything is.
+        feet: whether the contact points push.
+        thrusts: the greatest thrust of each jet [N], (jets,).
+        moments: whether moments count; without, forces act wherever they are wanted.
+    """
+    robot, world = task.robot, replace(task.world, friction_cone=FrictionCone.PYRAMID)
+    forces = cs.SX.sym("f", 3 * len(robot.contacts))
+    thrust = cs.SX.sym("T", len(robot.jets))
+    knot = knot_of(task, posture, forces, thrust)
+    balance = constraints.static_equilibrium(knot, world).expression
+    cone = constraints.friction_cone(knot, world).expression
+    free = cs.vertcat(forces, thrust)
+    rows = cs.Function("rows", [free], [cs.vertcat(balance, cone), cs.jacobian(cs.vertcat(balance, cone), free)])
+    offset, matrix = (np.array(part) for part in rows(np.zeros(free.shape[0])))
+    missed = np.vstack([np.eye(6), np.zeros((cone.shape[0], 6))])
+    matrix = np.hstack([matrix, missed, -missed])
+    counts = np.array([1.0] * 3 + [moments / _LEVER] * 3)
+    reach = np.full(forces.shape[0], np.inf if feet else 0.0)
+    programme = cs.conic("balance", "highs", {"h": cs.Sparsity(matrix.shape[1], matrix.shape[1]),
+                         "a": cs.DM(matrix).sparsity()}, {"highs": {"output_flag": False}})  # fmt: skip
+    answer = programme(
+        g=np.concatenate([np.zeros(free.shape[0]), counts, counts]),
+        a=matrix,
+        lba=-offset,
+        uba=np.concatenate([-offset[:6], np.full((cone.shape[0], 1), np.inf)]),
+        lbx=np.concatenate([-reach, np.zeros(len(robot.jets) + 12)]),
+        ubx=np.concatenate([reach, thrusts, np.full(12, np.inf)]),
+    )
+    left = np.array(answer["x"]).ravel()[-12:]
+    over = left[:6] - left[6:]
+    return Residual(
+        force=float(np.linalg.norm(over[:3])),
+        moment=float(np.linalg.norm(over[3:])) if moments else 0.0,
+        carried=robot.weight,
+    )
+
+
+def knot_of(task: Task, posture: Posture, forces: cs.SX, thrust: cs.SX) -> Knot:
+    """Return a knot at rest in a posture, with contact forces [N] and thrusts [N] as symbols."""
+    robot = task.robot
+    count, jets = len(robot.joint_names), len(robot.jets)
+    return Knot(
+        robot=robot,
+        com_position=cs.SX(com_of(task, posture)),
+        com_velocity=cs.SX.zeros(3),
+        angular_momentum=cs.SX.zeros(3),
+        base_position=cs.SX(posture.base_position),
+        base_quaternion_xyzw=cs.SX(posture.base_quaternion_xyzw),
+        base_linear_velocity=cs.SX.zeros(3),
+        base_angular_velocity=cs.SX.zeros(3),
+        joint_positions=cs.SX(posture.joint_positions),
+        joint_velocities=cs.SX.zeros(count),
+        contact_positions=cs.SX(contact_positions(robot, posture)),
+        contact_forces=forces,
+        thrust=thrust,
+        thrust_rate=cs.SX.zeros(jets),
+        throttle=cs.SX.zeros(jets),
+    )
+
+
+def com_of(task: Task, posture: Posture) -> Array:
+    """Return the CoM of a posture in the world [m], (3,)."""
+    return np.array(task.robot.kindyn.CoM_position(base_transform(posture), posture.joint_positions)).ravel()

@@ -1,0 +1,48 @@
+"""`doctor`: all checks in their order, from what is looked up to what has to be computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from multimodal_to.doctor.diagnosis import Diagnosis, Symptom, error
+from multimodal_to.doctor.formulation import formulation
+from multimodal_to.doctor.ground import height, hold
+from multimodal_to.doctor.hover import trim
+from multimodal_to.doctor.reach import reach
+from multimodal_to.doctor.task import Task
+from multimodal_to.doctor.thrust import spool_up_time, weight
+from multimodal_to.doctor.travel import leap, push, speed
+from multimodal_to.doctor.weighing import costs, groups, scales
+from multimodal_to.errors import MultimodalError
+from multimodal_to.models.robot import Robot
+from multimodal_to.ocp.scenario import Scenario
+
+Check = Callable[[Task], Iterator[Symptom]]
+
+CHECKS: tuple[Check, ...] = (
+    groups, costs, scales, weight, spool_up_time, speed, push, leap, height, hold, reach, trim,
+)  # fmt: skip
+"""What is asked of every task."""
+ONCE_SOUND: tuple[Check, ...] = (formulation,)
+"""What is asked of a task in which the others found no error: it needs a problem that can be made."""
+
+
+def doctor(robot: Robot, scenario: Scenario) -> Diagnosis:
+    """Return what can be said of a task before its problem is built and solved, in about a second.
+
+    An error is certain, or as certain as what `build` refuses: no motion does what is asked. Nothing is raised for a
+    task that makes no sense; it is an error among the findings.
+    """
+    task = Task.of(robot, scenario)
+    if not robot.contacts:
+        return refusal("contacts", f"{robot.name} has no contact points to stand on", "name some in its robot.toml")
+    findings = [finding for check in CHECKS for finding in check(task)]
+    diagnosis = Diagnosis(findings=tuple(findings))
+    if diagnosis.hopeless:
+        return diagnosis
+    return Diagnosis(findings=(*findings, *(finding for check in ONCE_SOUND for finding in check(task))))
+
+
+def refusal(name: str, found: str | MultimodalError, change: str = "") -> Diagnosis:
+    """Return the diagnosis of a task that cannot even be looked at."""
+    return Diagnosis(findings=(error(name, str(found), change),))

@@ -1,0 +1,91 @@
+"""What the problem's own variables, bounds and rows say, before anything is derived of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
+
+from multimodal_to.doctor.diagnosis import Symptom, error, warning
+from multimodal_to.doctor.task import Task
+from multimodal_to.errors import MultimodalError
+from multimodal_to.ocp.problem import formulate
+from multimodal_to.ocp.stages import NamedStage
+from multimodal_to.ocp.variables import Bounds, Layout
+from multimodal_to.trajectory import QUANTITIES
+
+_INTEGRATION = "_integration"  # what the names of rows end with that tie a variable to its own rate and nothing else
+
+
+def formulation(task: Task) -> Iterator[Symptom]:
+    """Look for bounds that contradict each other and for variables that nothing asks for."""
+    try:
+        layout, bounds, stages = formulate(task.robot, task.scenario, task.posture)
+    except MultimodalError as cause:
+        yield error(
+            "boundary", str(cause), "let the scenario's start and end lie within the ranges of scenario and robot"
+        )
+        return
+    yield from _crossed(task, bounds)
+    yield from _unseen(task, layout, bounds, stages)
+
+
+def _crossed(task: Task, bounds: Bounds) -> Iterator[Symptom]:
+    """Name the first bound of each variable whose least value is above its greatest."""
+    for name in bounds.lower:
+        crossed = np.argwhere(bounds.lower[name] > bounds.upper[name] + 1e-9)
+        if not crossed.size:
+            continue
+        row, knot = crossed[0]
+        least, greatest = bounds.lower[name][row, knot], bounds.upper[name][row, knot]
+        middle = name == "com_position" and knot == task.scenario.knots // 2
+        yield error(
+            "bounds",
+            f"{name}[{row}] has to be at least {least:.6g} and at most {greatest:.6g} {QUANTITIES[name].unit} at knot "
+            f"{knot}",
+            "lower mid_height_min or widen com_range" if middle else "widen the one or the other",
+        )
+
+
+def _unseen(task: Task, layout: Layout, bounds: Bounds, stages: list[NamedStage]) -> Iterator[Symptom]:
+    """Name the variables that are free and that no row and no cost sees but their own integration."""
+    seen, ties = np.zeros(layout.size, dtype=bool), list[NDArray[np.int64]]()
+    for named in stages:
+        for columns, integration in _dependencies(named, layout.size):
+            if integration:
+                ties.append(columns)
+            else:
+                seen[columns] = True
+    for columns in ties:
+        if seen[columns].any():
+            seen[columns] = True
+    for name, rows in layout.rows.items():
+        free = (bounds.lower[name] < bounds.upper[name]).any(axis=1)
+        lost = np.flatnonzero(~seen[rows] & free)
+        if lost.size:
+            yield warning(
+                "unseen variables",
+                f"{', '.join(_label(task, name, index) for index in lost)} of {name} appear in no row and no cost but "
+                "in their own integration, so that nothing says what they should be",
+                "give them a weight, or lock these joints by leaving them out of robot.toml",
+            )
+
+
+def _dependencies(named: NamedStage, size: int) -> Iterator[tuple[NDArray[np.int64], bool]]:
+    """Return, for each row and cost of a stage, the variables it sees at any knot, and whether it is an integration."""
+    stage = named.stage
+    names = [name for name, rows in named.rows for _ in range(rows.expression.shape[0])] + [*named.cost_names]
+    arguments = cs.vertcat(stage.start, stage.end)
+    function = cs.Function("sees", [arguments, stage.interval], [cs.vertcat(stage.rows, stage.costs)])
+    rows, columns = (np.array(part, dtype=np.int64) for part in function.jac_sparsity(0, 0).get_triplet())
+    for index, name in enumerate(names):
+        yield np.unique(columns[rows == index] % size), name.endswith(_INTEGRATION)
+
+
+def _label(task: Task, name: str, index: int) -> str:
+    """Return what a component of a variable belongs to."""
+    robot, quantity = task.robot, QUANTITIES[name]
+    bodies = {"joint": robot.joint_names, "contact": robot.contact_names, "jet": robot.jet_names}.get(quantity.of)
+    return f"'{bodies[index // quantity.rows]}'" if bodies else f"component {index}"

@@ -1,0 +1,94 @@
+"""Is there a posture in which the thrusts hold the robot in the air, upright, where it has to hover?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import casadi as cs
+import numpy as np
+
+from multimodal_to.adam.tree import BASE
+from multimodal_to.doctor.balance import Residual, residual
+from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
+from multimodal_to.doctor.search import search
+from multimodal_to.doctor.task import Task
+from multimodal_to.models.robot import Posture
+from multimodal_to.ocp import constraints
+from multimodal_to.ocp.constraints import Rows, World
+from multimodal_to.ocp.scenario import Vector3
+from multimodal_to.ocp.variables import Knot
+
+_UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
+_SLACK = 5e-3
+"""Share of the weight that a base within its tolerance of upright, and what force contacts may keep, can make up."""
+_ROWS = (
+    constraints.static_equilibrium,
+    constraints.non_penetration,
+    constraints.contact_reach,
+    constraints.jet_reach,
+)
+"""The problem's own rows of a knot that hovers, beside those that thrusts within their limits and no force fulfil."""
+
+
+def trim(task: Task) -> Iterator[Symptom]:
+    """Look for thrusts that carry weight and moment: first in the posture as it is, then in any."""
+    if not (task.hovers and task.lifts):
+        return
+    posture = upright(task)
+    here = residual(task, posture, feet=False, thrusts=task.thrusts_held)
+    if here.nothing:
+        return
+    if reason := _impossible(task, posture, here):
+        yield error("hover trim", reason, "change where the jets are or point, or their greatest thrusts")
+        return
+    for when, com in task.hovers.items():
+        found = trimmed(task, com)
+        if found is None:
+            yield warning(
+                "hover trim",
+                f"no posture was found in which the thrusts hold the robot upright at the {when}, with the CoM at "
+                f"{com} m; in the posture that it starts from they leave {here} over",
+                "look at where the jets point, their greatest thrusts and the joints' ranges, and whether the feet are "
+                "clear of the ground there",
+            )
+        else:
+            turned = np.abs(found.joint_positions - posture.joint_positions)
+            yield note(
+                "hover trim",
+                f"the posture as it stands cannot hover, thrusts leave {here} over; one with "
+                f"{task.robot.joint_names[int(turned.argmax())]} moved by {turned.max():.2f} rad can, at the {when}",
+            )
+
+
+def upright(task: Task) -> Posture:
+    """Return the posture with the base upright, where a hover has to be within 2e-3 rad of it."""
+    return replace(task.posture, base_quaternion_xyzw=_UPRIGHT)
+
+
+def _impossible(task: Task, posture: Posture, here: Residual) -> str:
+    """Return why no posture can hover, where that is certain: what the jets point at does not depend on the joints."""
+    tree, slack = task.robot.kindyn.tree, _SLACK * task.robot.weight
+    if task.rigid and here.force + here.moment > slack:
+        return f"no joint moves, and within their limits the thrusts leave {here} over"
+    if all(tree.frame(jet.frame).body == BASE for jet in task.robot.jets):
+        force = residual(task, posture, feet=False, thrusts=task.thrusts_held, moments=False).force
+        if force > slack:
+            return f"the jets sit on the base, and with it upright their thrusts leave {force:.3g} N of the weight over"
+    return ""
+
+
+def trimmed(task: Task, com: Vector3) -> Posture | None:
+    """Return the posture nearest to the one the problem is built around that hovers upright with its CoM at `com` [m].
+
+    None if the search finds none.
+    """
+    start = upright(task)
+
+    def there(knot: Knot, world: World) -> Rows:
+        return Rows(expression=knot.com_position - cs.DM(com), lower=0.0, upper=0.0, unit="m")
+
+    def away(knot: Knot) -> cs.SX:
+        return cs.sumsqr(knot.joint_positions - start.joint_positions)
+
+    return search(task, start, com, rows=(there, *_ROWS), objective=away, thrusts=task.thrusts_held)

@@ -1,0 +1,75 @@
+"""A posture that fulfils some of the problem's own rows, by inverse kinematics and statics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
+
+from multimodal_to.adam import centroidal
+from multimodal_to.adam.spatial import SX
+from multimodal_to.doctor.balance import com_of, knot_of
+from multimodal_to.doctor.task import Task
+from multimodal_to.models.robot import Posture
+from multimodal_to.ocp.constraints import KnotRows
+from multimodal_to.ocp.scenario import Vector3
+from multimodal_to.ocp.variables import Knot
+
+Array = NDArray[np.float64]
+
+
+def search(
+    task: Task, start: Posture, com: Vector3, *, rows: Sequence[KnotRows], objective: Callable[[Knot], SX],
+    thrusts: Array,
+) -> Posture | None:  # fmt: skip
+    """Return the posture with the least objective that fulfils rows at rest without contact forces, if one is found.
+
+    The base keeps its orientation; its position, joints and thrusts are free. Solved by IPOPT, from one start: none
+    found is no proof that there is none.
+
+    Args:
+        task: robot and scenario.
+        start: posture to begin from, moved to where its CoM is at `com`.
+        com: [m].
+        rows: the problem's own, of a knot.
+        objective: of a knot.
+        thrusts: the greatest of each jet [N], (jets,); begun from in equal shares that carry the weight.
+    """
+    robot, limits = task.robot, task.robot.joint_limits
+    position, joints = cs.SX.sym("p", 3), cs.SX.sym("s", len(robot.joint_names))
+    thrust = cs.SX.sym("T", len(robot.jets))
+    posed = replace(
+        knot_of(task, start, cs.SX.zeros(3 * len(robot.contacts)), thrust),
+        base_position=position,
+        joint_positions=joints,
+    )
+    knot = replace(
+        posed,
+        com_position=centroidal.com_position(robot.kindyn.tree, posed.base, joints),
+        contact_positions=cs.vertcat(*(posed.pose(name).translation for name in robot.contact_names)),
+    )
+    world = task.world
+    asked = [function(knot, world) for function in rows]
+    problem = {
+        "x": cs.vertcat(position, joints, thrust),
+        "f": objective(knot),
+        "g": cs.vertcat(*(some.expression / some.scale for some in asked)),
+    }
+    options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-6}}
+    solver = cs.nlpsol("search", "ipopt", problem, options)
+    there = start.base_position + np.array(com) - com_of(task, start)
+    share = thrusts * min(robot.weight / max(thrusts.sum(), 1e-9), 1.0)
+    answer = solver(
+        x0=np.concatenate([there, start.joint_positions, share]),
+        lbx=np.concatenate([np.full(3, -np.inf), limits.lower, np.zeros(share.size)]),
+        ubx=np.concatenate([np.full(3, np.inf), limits.upper, thrusts]),
+        lbg=np.concatenate([np.full(some.expression.shape[0], some.lower / some.scale) for some in asked]),
+        ubg=np.concatenate([np.full(some.expression.shape[0], some.upper / some.scale) for some in asked]),
+    )
+    if not solver.stats()["success"]:
+        return None
+    values = np.array(answer["x"]).ravel()
+    return replace(start, base_position=values[:3], joint_positions=values[3 : 3 + joints.shape[0]])

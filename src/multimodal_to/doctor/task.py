@@ -1,0 +1,114 @@
+"""`Task`: a robot and what is asked of it, with what several checks need to know; each is worked out once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from multimodal_to.doctor.turbines import greatest_held
+from multimodal_to.errors import ScenarioError
+from multimodal_to.models.robot import Posture, Robot
+from multimodal_to.models.terrain import FlatGround, Plane
+from multimodal_to.ocp.constraints import World
+from multimodal_to.ocp.guess import standing_posture
+from multimodal_to.ocp.scenario import Scenario, Start, Terminal, Vector3
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Task:
+    """A scenario for a robot with the jets that it uses."""
+
+    robot: Robot
+    scenario: Scenario
+
+    @classmethod
+    def of(cls, robot: Robot, scenario: Scenario) -> Task:
+        """Return a scenario for a robot, whose jets are left out if the scenario leaves them off."""
+        return cls(robot=robot if scenario.jets else robot.with_jets(()), scenario=scenario)
+
+    # ---------------------------------------------------------------- time
+
+    @property
+    def longest(self) -> float:
+        """Return the horizon's greatest duration [s]."""
+        return self.scenario.knots * self.scenario.interval_max
+
+    @property
+    def moving_intervals(self) -> int:
+        """Return over how many intervals the CoM can move: one that ends at rest stands still over the last two."""
+        return self.scenario.knots - (0 if self.scenario.terminal is Terminal.FREE else 2)
+
+    # ---------------------------------------------------------------- in the air
+
+    @cached_property
+    def hovers(self) -> dict[str, Vector3]:
+        """Return where the CoM has to hover [m], by when."""
+        scenario, where = self.scenario, dict[str, Vector3]()
+        if scenario.start is Start.HOVER:
+            where["start"] = scenario.initial_com
+        if scenario.terminal is Terminal.HOVER:
+            where["end"] = scenario.final_com
+        return where
+
+    @cached_property
+    def thrusts_held(self) -> Array:
+        """Return the greatest thrust that each jet can hold [N], (jets,)."""
+        return np.array([greatest_held(jet) for jet in self.robot.jets])
+
+    @property
+    def lifts(self) -> bool:
+        """Return whether the jets, all pointing straight up, can hold the weight."""
+        return float(self.thrusts_held.sum()) >= self.robot.weight
+
+    # ---------------------------------------------------------------- on the ground
+
+    @property
+    def stands_at_start(self) -> bool:
+        """Return whether the motion starts on its feet."""
+        return self.scenario.start is Start.STANDING
+
+    @property
+    def stands_at_end(self) -> bool:
+        """Return whether the motion has to end on its feet."""
+        return self.scenario.terminal is Terminal.STANDING
+
+    @property
+    def on_plane(self) -> bool:
+        """Return whether the ground is the same everywhere but for its height."""
+        return isinstance(self.scenario.surface, FlatGround | Plane)
+
+    @cached_property
+    def start_posture(self) -> Posture | None:
+        """Return the posture in which the motion starts on its feet, if it does and there is one."""
+        return self._standing(self.scenario.initial_com) if self.stands_at_start else None
+
+    @cached_property
+    def end_posture(self) -> Posture | None:
+        """Return a posture in which the motion can end on its feet, if it has to and one is found."""
+        return self._standing(self.scenario.final_com) if self.stands_at_end else None
+
+    @property
+    def posture(self) -> Posture:
+        """Return the posture that the problem is built around, as far as there is one; else home."""
+        return self.start_posture or self.end_posture or self.robot.home
+
+    @property
+    def world(self) -> World:
+        """Return what the problem's rows may ask for."""
+        return World.of(self.robot, self.scenario, self.posture)
+
+    @property
+    def rigid(self) -> bool:
+        """Return whether no joint can move."""
+        return not np.any(self.robot.joint_limits.lower < self.robot.joint_limits.upper)
+
+    def _standing(self, com: Vector3) -> Posture | None:
+        try:
+            return standing_posture(self.robot, self.scenario.surface, com)
+        except ScenarioError:
+            return None

@@ -1,0 +1,57 @@
+"""Can the jets carry the weight, and are they there in time?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
+from multimodal_to.doctor.task import Task
+from multimodal_to.doctor.turbines import spool_up
+
+_HURRY = 0.8
+"""Share of the longest horizon beyond which spooling up leaves little time to move [1]."""
+_PATIENCE = 60.0
+"""How long jets are watched to say how long they would need [s]."""
+
+
+def weight(task: Task) -> Iterator[Symptom]:
+    """Compare the weight with the thrust that the jets hold, where the robot has to hover."""
+    if not task.hovers:
+        return
+    robot, when = task.robot, " and ".join(task.hovers)
+    if not robot.jets:
+        why = f"{robot.name} has none" if task.scenario.jets else "the scenario leaves them off (jets = false)"
+        yield error("thrust", f"the robot has to hover at the {when} without jets: {why}",
+                    "give it jets, or another start or terminal")  # fmt: skip
+    elif not task.lifts:
+        yield error(
+            "thrust",
+            f"the robot has to hover at the {when}, but it weighs {robot.weight:.0f} N ({robot.mass:.1f} kg) and its "
+            f"{len(robot.jets)} jets together hold at most {task.thrusts_held.sum():.0f} N",
+            "take a lighter robot or stronger jets, or a start and terminal on the ground",
+        )
+
+
+def spool_up_time(task: Task) -> Iterator[Symptom]:
+    """Compare the time that idle jets need to carry the weight with the horizon's longest duration."""
+    robot, scenario = task.robot, task.scenario
+    if not (task.stands_at_start and "end" in task.hovers and task.lifts):
+        return
+    step = scenario.interval_max
+    times = step * np.arange(1, max(scenario.knots, int(_PATIENCE / step)) + 1)
+    enough = np.flatnonzero(spool_up(robot.jets, times).sum(axis=0) >= robot.weight)
+    needed = times[enough[0]] if enough.size else np.inf
+    reached = f"the jets need {needed:.1f} s" if enough.size else f"the jets need more than {times[-1]:.0f} s"
+    found = f"{reached} at full throttle from idle until they carry {robot.weight:.0f} N, and the horizon is"
+    have = f"{scenario.knots} intervals of up to {step:g} s"
+    if needed > task.longest + 1e-9:
+        least = f"knots = {int(np.ceil(needed / step))} or " if enough.size else "more knots or "
+        yield error("spool-up", f"{found} at most {task.longest:.3g} s long ({have})", f"allow {least}"
+                    f"a longer interval_max")  # fmt: skip
+    elif needed > _HURRY * task.longest:
+        yield warning("spool-up", f"{found} at most {task.longest:.3g} s long ({have}), which leaves little",
+                      "allow more knots or a longer interval_max")  # fmt: skip
+    else:
+        yield note("spool-up", f"{found} up to {task.longest:.3g} s long")

@@ -1,0 +1,97 @@
+"""Do the weights name what exists, and are costs and variables of sizes that the solver can tell apart?"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+
+import numpy as np
+
+from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
+from multimodal_to.doctor.task import Task
+from multimodal_to.errors import ModelError
+from multimodal_to.ocp.scenario import Weights
+from multimodal_to.ocp.solvers import Ipopt
+from multimodal_to.ocp.variables import INTERVAL_SCALE, SCALES
+
+_FAINT = Ipopt().tolerance ** 2
+"""Share of the greatest cost below which one is lost: costs are squares, and the solver stops at its tolerance."""
+_OBJECTIVE = (1e-2, 1e5)
+"""Sizes of the scaled objective with which the solver is known to get on [1]; the bundled ones have 1e3."""
+_OFF = 30.0
+"""How many times its scale a variable may be before it is worth saying [1]."""
+_JETS = ("thrust", "thrust_rate", "throttle")
+
+
+def groups(task: Task) -> Iterator[Symptom]:
+    """Look up the joint groups that weights name."""
+    members = Counter[str]()
+    for group in task.scenario.weights.joint_velocities:
+        try:
+            task.robot.group_indices(group)
+        except ModelError as cause:
+            yield error("weights", f"weights.joint_velocities: {cause}", "name a joint group of the robot's robot.toml")
+        else:
+            members.update(task.robot.joint_groups[group])
+    if twice := [name for name, count in members.items() if count > 1]:
+        yield warning("weights", f"weights.joint_velocities weighs {', '.join(twice)} by more than one group, and the "
+                      "last one counts alone", "name groups that do not overlap")  # fmt: skip
+
+
+def costs(task: Task) -> Iterator[Symptom]:
+    """Compare weight × size² of each cost, with the solver's scales as sizes, among each other and with the solver's."""
+    sizes = dict(_sizes(task.scenario.weights))
+    if not task.robot.jets:
+        idle = [name for name in _JETS if sizes.pop(name, 0.0)]
+        if idle and task.scenario.jets:
+            yield note("weights", f"{', '.join(idle)} weigh nothing: {task.robot.name} has no jets")
+    if not sizes:
+        yield warning("weights", "no cost has a weight, so that any motion that is possible is as good as another",
+                      "give weights to what matters")  # fmt: skip
+        return
+    greatest = max(sizes, key=lambda name: sizes[name])
+    for name, size in sizes.items():
+        if size < _FAINT * sizes[greatest]:
+            yield warning(
+                "weights",
+                f"at the size that the solver takes for one, {name} costs {size:.1e} and {greatest} "
+                f"{sizes[greatest]:.1e}: the objective cannot see the smaller",
+                f"raise weights.{name} or lower weights.{greatest}",
+            )
+    scaled = Ipopt().objective_scale * sizes[greatest]
+    if not _OBJECTIVE[0] <= scaled <= _OBJECTIVE[1]:
+        yield warning(
+            "scale of the objective",
+            f"the greatest cost, {greatest}, is {scaled:.1e} in the solver's units, beyond {_OBJECTIVE[0]:g} to "
+            f"{_OBJECTIVE[1]:g}",
+            f"multiply all weights by {1e3 / scaled:.0e}, or solve with Ipopt(objective_scale=...) so much larger",
+        )
+
+
+def _sizes(weights: Weights) -> Iterator[tuple[str, float]]:
+    for entry in fields(weights):
+        value = getattr(weights, entry.name)
+        heaviest = max(value.values(), default=0.0) if isinstance(value, Mapping) else value
+        if heaviest:
+            variable = {"contact_force_rates": "contact_forces"}.get(entry.name, entry.name)
+            yield entry.name, float(heaviest) * SCALES.get(variable, 1.0) ** 2
+
+
+def scales(task: Task) -> Iterator[Symptom]:
+    """Compare what the robot's variables will be with the sizes that the solver takes for one."""
+    robot, scenario = task.robot, task.scenario
+    expected = {
+        "contact_forces": (robot.weight / len(robot.contacts), SCALES["contact_forces"], "N"),
+        "com_position": (float(np.abs([scenario.initial_com, scenario.final_com]).max()), SCALES["com_position"], "m"),
+        "interval": (scenario.interval_max, INTERVAL_SCALE, "s"),
+    }
+    if robot.jets and task.hovers:
+        expected["thrust"] = robot.weight / len(robot.jets), SCALES["thrust"], "N"
+    for name, (size, scale, unit) in expected.items():
+        if size and not 1 / _OFF <= size / scale <= _OFF:
+            yield warning(
+                "scales",
+                f"{name} will be about {size:.2g} {unit}, and the solver takes {scale:g} {unit} for one",
+                "change SCALES or INTERVAL_SCALE in ocp/variables.py for a robot or a task of this size",
+            )
