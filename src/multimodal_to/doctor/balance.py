@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import casadi as cs
@@ -17,8 +18,10 @@ from multimodal_to.ocp.variables import Knot
 
 Array = NDArray[np.float64]
 
-_LEVER = 0.3
+LEVER = 0.3
 """What a residual moment is divided by to weigh it against a residual force [m]."""
+LONG_LEVER = 100.0
+"""One with which forces are met first, so that what is left over is a moment wherever it can be one [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,16 +33,21 @@ class Residual:
     carried: float  # the weight [N]
 
     @property
+    def share(self) -> float:
+        """Return the residual as a share of the weight, a moment as the force that makes it at `LEVER`."""
+        return (self.force + self.moment / LEVER) / self.carried
+
+    @property
     def nothing(self) -> bool:
         """Return whether the posture is held still, up to a ten-thousandth of the weight."""
-        return max(self.force, self.moment / _LEVER) <= 1e-4 * self.carried
+        return self.share <= 1e-4
 
     def __str__(self) -> str:
         return f"{self.force:.3g} N and {self.moment:.3g} N m"
 
 
-def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, moments: bool = True) -> Residual:
-    """Return the least residual, ‖force‖₁ + ‖moment‖₁ / _LEVER, of a posture at rest.
+def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, lever: float = LEVER) -> Residual:
+    """Return the least residual, ‖force‖₁ + ‖moment‖₁ / lever, of a posture at rest.
 
     Contact forces lie in the friction pyramid, which holds the second-order cone.
 
@@ -48,7 +56,7 @@ def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, moment
         posture: where everything is.
         feet: whether the contact points push.
         thrusts: the greatest thrust of each jet [N], (jets,).
-        moments: whether moments count; without, forces act wherever they are wanted.
+        lever: what moments are divided by [m]; with an infinite one forces act wherever they are wanted.
     """
     robot, world = task.robot, replace(task.world, friction_cone=FrictionCone.PYRAMID)
     forces = cs.SX.sym("f", 3 * len(robot.contacts))
@@ -61,7 +69,7 @@ def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, moment
     offset, matrix = (np.array(part) for part in rows(np.zeros(free.shape[0])))
     missed = np.vstack([np.eye(6), np.zeros((cone.shape[0], 6))])
     matrix = np.hstack([matrix, missed, -missed])
-    counts = np.array([1.0] * 3 + [moments / _LEVER] * 3)
+    counts = np.array([1.0] * 3 + [1.0 / lever] * 3)
     reach = np.full(forces.shape[0], np.inf if feet else 0.0)
     programme = cs.conic("balance", "highs", {"h": cs.Sparsity(matrix.shape[1], matrix.shape[1]),
                          "a": cs.DM(matrix).sparsity()}, {"highs": {"output_flag": False}})  # fmt: skip
@@ -77,7 +85,7 @@ def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, moment
     over = left[:6] - left[6:]
     return Residual(
         force=float(np.linalg.norm(over[:3])),
-        moment=float(np.linalg.norm(over[3:])) if moments else 0.0,
+        moment=float(np.linalg.norm(over[3:])) if math.isfinite(lever) else 0.0,
         carried=robot.weight,
     )
 

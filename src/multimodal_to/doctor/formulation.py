@@ -24,9 +24,7 @@ def formulation(task: Task) -> Iterator[Symptom]:
     try:
         layout, bounds, stages = formulate(task.robot, task.scenario, task.posture)
     except MultimodalError as cause:
-        yield error(
-            "boundary", str(cause), "let the scenario's start and end lie within the ranges of scenario and robot"
-        )
+        yield error("boundary", str(cause), "let start and end lie within the ranges of scenario and robot")
         return
     yield from _crossed(task, bounds)
     yield from _unseen(task, layout, bounds, stages)
@@ -61,16 +59,17 @@ def _unseen(task: Task, layout: Layout, bounds: Bounds, stages: list[NamedStage]
     for columns in ties:
         if seen[columns].any():
             seen[columns] = True
+    lost = []
     for name, rows in layout.rows.items():
         free = (bounds.lower[name] < bounds.upper[name]).any(axis=1)
-        lost = np.flatnonzero(~seen[rows] & free)
-        if lost.size:
-            yield warning(
-                "unseen variables",
-                f"{', '.join(_label(task, name, index) for index in lost)} of {name} appear in no row and no cost but "
-                "in their own integration, so that nothing says what they should be",
-                "give them a weight, or lock these joints by leaving them out of robot.toml",
-            )
+        lost += [f"{name} of {_label(task, name, int(index))}" for index in np.flatnonzero(~seen[rows] & free)]
+    if lost:
+        yield warning(
+            "unseen variables",
+            f"no row and no cost sees {', '.join(lost)}, beside the integration, so that nothing says what they should "
+            "be",
+            "give them a weight, or lock a joint by leaving it out of robot.toml",
+        )
 
 
 def _dependencies(named: NamedStage, size: int) -> Iterator[tuple[NDArray[np.int64], bool]]:

@@ -1,4 +1,4 @@
-"""Can the robot stand where it has to: do the legs reach, does friction hold, is the CoM above the feet?"""
+"""Whether the robot can stand where it has to: the legs reach, friction holds, and the CoM is above the feet."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import casadi as cs
 import numpy as np
 
-from multimodal_to.doctor.balance import com_of, residual
+from multimodal_to.doctor.balance import LONG_LEVER, com_of, residual
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.search import search
 from multimodal_to.doctor.task import Task
@@ -54,7 +54,7 @@ def _no_posture(task: Task, com: Vector3) -> str:
 def _other_height(task: Task, which: str) -> str:
     com: Vector3 = getattr(task.scenario, f"{which}_com")
     reached = _nearest_height(task, com)
-    hint = "" if reached is None else f", the nearest height found that the legs reach is {reached:.3f} m"
+    hint = "" if reached is None else f"; the nearest that the legs are found to reach is {reached:.3f} m"
     return f"choose another {which}_com_height{hint}"
 
 
@@ -74,7 +74,7 @@ def _nearest_height(task: Task, com: Vector3) -> float | None:
 
 
 def hold(task: Task) -> Iterator[Symptom]:
-    """Ask whether contact forces within the friction pyramid hold the robot where it stands, with thrusts at the end."""
+    """Ask whether contact forces in the friction pyramid, at the end with thrusts, hold the robot where it stands."""
     idle = np.zeros(len(task.robot.jets))
     start = None if task.start_posture is None else list(_held(task, "start", task.start_posture, idle, True))
     yield from start or ()
@@ -85,23 +85,23 @@ def hold(task: Task) -> Iterator[Symptom]:
 
 
 def _held(task: Task, when: str, posture: Posture, thrusts: np.ndarray, certain: bool) -> Iterator[Symptom]:
-    left = residual(task, posture, feet=True, thrusts=thrusts)
+    left = residual(task, posture, feet=True, thrusts=thrusts, lever=LONG_LEVER)
     if left.nothing:
         return
-    sliding = residual(task, posture, feet=True, thrusts=thrusts, moments=False)
+    sliding = residual(task, posture, feet=True, thrusts=thrusts, lever=math.inf)
     if not sliding.nothing:
         friction = task.world.friction
         yield (error if certain else warning)(
             f"friction at the {when}",
-            f"the ground under the feet is inclined by up to {_steepest(task, posture):.1f}°, and friction, {friction:g}"
-            f" (up to {math.degrees(math.atan(friction)):.1f}°), leaves {sliding.force:.3g} N of the weight unheld",
+            f"the ground under the feet is inclined by up to {_steepest(task, posture):.1f}°, and friction, "
+            f"{friction:g}, which holds {math.degrees(math.atan(friction)):.1f}°, leaves {sliding.force:.3g} N of the "
+            "weight over",
             "ask for more friction or flatter ground",
         )
     else:
         yield (error if certain and when == "start" else warning)(
             f"support at the {when}",
-            f"contact forces leave a moment of {left.moment:.3g} N m and {left.force:.3g} N over: the CoM is not above "
-            "the feet",
+            f"contact forces leave {left} over: the CoM is not above the feet",
             "put the feet under the CoM, by the robot's home posture or its contact points",
         )
 

@@ -1,7 +1,8 @@
-"""Is there a posture in which the thrusts hold the robot in the air, upright, where it has to hover?"""
+"""Whether there is a posture in which the thrusts hold the robot in the air, upright, where it has to hover."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -9,7 +10,7 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.tree import BASE
-from multimodal_to.doctor.balance import Residual, residual
+from multimodal_to.doctor.balance import LONG_LEVER, Residual, residual
 from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
 from multimodal_to.doctor.search import search
 from multimodal_to.doctor.task import Task
@@ -20,8 +21,8 @@ from multimodal_to.ocp.scenario import Vector3
 from multimodal_to.ocp.variables import Knot
 
 _UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
-_SLACK = 5e-3
-"""Share of the weight that a base within its tolerance of upright, and what force contacts may keep, can make up."""
+_SLACK = 2e-2
+"""Share of the weight that a base within its tolerance of upright, and what force contacts may keep, cannot make up."""
 _ROWS = (
     constraints.static_equilibrium,
     constraints.non_penetration,
@@ -36,7 +37,7 @@ def trim(task: Task) -> Iterator[Symptom]:
     if not (task.hovers and task.lifts):
         return
     posture = upright(task)
-    here = residual(task, posture, feet=False, thrusts=task.thrusts_held)
+    here = residual(task, posture, feet=False, thrusts=task.thrusts_held, lever=LONG_LEVER)
     if here.nothing:
         return
     if reason := _impossible(task, posture, here):
@@ -68,13 +69,13 @@ def upright(task: Task) -> Posture:
 
 def _impossible(task: Task, posture: Posture, here: Residual) -> str:
     """Return why no posture can hover, where that is certain: what the jets point at does not depend on the joints."""
-    tree, slack = task.robot.kindyn.tree, _SLACK * task.robot.weight
-    if task.rigid and here.force + here.moment > slack:
+    tree = task.robot.kindyn.tree
+    if task.rigid and residual(task, posture, feet=False, thrusts=task.thrusts_held).share > _SLACK:
         return f"no joint moves, and within their limits the thrusts leave {here} over"
     if all(tree.frame(jet.frame).body == BASE for jet in task.robot.jets):
-        force = residual(task, posture, feet=False, thrusts=task.thrusts_held, moments=False).force
-        if force > slack:
-            return f"the jets sit on the base, and with it upright their thrusts leave {force:.3g} N of the weight over"
+        left = residual(task, posture, feet=False, thrusts=task.thrusts_held, lever=math.inf)
+        if left.share > _SLACK:
+            return f"the jets sit on the base, and with it upright they leave {left.force:.3g} N of the weight over"
     return ""
 
 

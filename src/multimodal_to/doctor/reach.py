@@ -1,4 +1,4 @@
-"""Are contact points and jets as near to the CoM as the problem wants them?"""
+"""Whether contact points and jets are as near to the CoM as the problem wants them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Can the jets carry the weight, and are they there in time?"""
+"""Whether the jets can carry the weight, and whether they are there in time."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ def spool_up_time(task: Task) -> Iterator[Symptom]:
     if not (task.stands_at_start and "end" in task.hovers and task.lifts):
         return
     step = scenario.interval_max
-    times = step * np.arange(1, max(scenario.knots, int(_PATIENCE / step)) + 1)
+    count = max(scenario.knots, int(_PATIENCE / step))
+    times = np.linspace(step, count * step, count)
     enough = np.flatnonzero(spool_up(robot.jets, times).sum(axis=0) >= robot.weight)
     needed = times[enough[0]] if enough.size else np.inf
     reached = f"the jets need {needed:.1f} s" if enough.size else f"the jets need more than {times[-1]:.0f} s"
@@ -48,8 +49,8 @@ def spool_up_time(task: Task) -> Iterator[Symptom]:
     have = f"{scenario.knots} intervals of up to {step:g} s"
     if needed > task.longest + 1e-9:
         least = f"knots = {int(np.ceil(needed / step))} or " if enough.size else "more knots or "
-        yield error("spool-up", f"{found} at most {task.longest:.3g} s long ({have})", f"allow {least}"
-                    f"a longer interval_max")  # fmt: skip
+        yield error("spool-up", f"{found} at most {task.longest:.3g} s long ({have})",
+                    f"allow {least}a longer interval_max")  # fmt: skip
     elif needed > _HURRY * task.longest:
         yield warning("spool-up", f"{found} at most {task.longest:.3g} s long ({have}), which leaves little",
                       "allow more knots or a longer interval_max")  # fmt: skip

@@ -1,4 +1,4 @@
-"""Is there time for the way, given how fast the base may move, how hard feet can push and how things fall?"""
+"""Whether there is time for the way, given how fast the base moves, how hard feet push and how things fall."""
 
 from __future__ import annotations
 
@@ -18,8 +18,12 @@ _LIMBS = 0.15
 
 
 def speed(task: Task) -> Iterator[Symptom]:
-    """Compare each stretch that the CoM has to travel with the greatest base speed and the longest time."""
+    """Compare the stretches that the CoM has to travel with the greatest base speed and the longest time."""
     scenario = task.scenario
+
+    def furthest(intervals: int) -> float:
+        return intervals * scenario.interval_max * scenario.base_speed_max
+
     start, end = np.array(scenario.initial_com), np.array(scenario.final_com)
     stretches = [("from start to end", float(np.abs(end - start).max()), task.moving_intervals)]
     if scenario.mid_height_min is not None:
@@ -28,17 +32,16 @@ def speed(task: Task) -> Iterator[Symptom]:
             ("up to mid_height_min", scenario.mid_height_min - start[2], middle),
             ("down from mid_height_min", scenario.mid_height_min - end[2], task.moving_intervals - middle),
         ]
-    for label, distance, intervals in stretches:
-        time = intervals * scenario.interval_max
-        if distance <= scenario.base_speed_max * time:
-            continue
-        certain = distance - _LIMBS > scenario.base_speed_max * (time + scenario.interval_max) or intervals <= 0
-        yield (error if certain else warning)(
-            "time for the distance",
-            f"the CoM has to go {distance:.3g} m {label} in at most {time:.3g} s ({intervals} intervals in which it can "
-            f"move), and base_speed_max is {scenario.base_speed_max:g} m/s",
-            "allow more knots, a longer interval_max or more speed",
-        )
+    label, distance, intervals = max(stretches, key=lambda stretch: stretch[1] - furthest(stretch[2]))
+    if distance <= furthest(intervals):
+        return
+    certain = distance - _LIMBS > furthest(intervals + 1) or intervals <= 0
+    yield (error if certain else warning)(
+        "time for the distance",
+        f"the CoM has to go {distance:.3g} m {label} in at most {intervals * scenario.interval_max:.3g} s ({intervals} "
+        f"intervals in which it can move), and base_speed_max is {scenario.base_speed_max:g} m/s",
+        "allow more knots, a longer interval_max or more speed",
+    )
 
 
 def push(task: Task) -> Iterator[Symptom]:
@@ -57,8 +60,8 @@ def push(task: Task) -> Iterator[Symptom]:
     if way.max() > furthest:
         yield error(
             "time for the distance",
-            f"the CoM has to go {way.max():.3g} m along {'xy'[int(way.argmax())]} in at most {moving * step:.3g} s, and "
-            f"friction, {friction:g}, moves it by at most {furthest:.3g} m from rest to rest",
+            f"the CoM has to go {way.max():.3g} m along {'xy'[int(way.argmax())]} in at most {moving * step:.3g} s, "
+            f"and friction, {friction:g}, moves it by at most {furthest:.3g} m from rest to rest",
             "allow more knots, a longer interval_max or more friction",
         )
 
@@ -76,7 +79,9 @@ def leap(task: Task) -> Iterator[Symptom]:
         heights["the height of final_com"] = scenario.final_com[2]
     gravity = robot.weight / robot.mass
     for label, height in heights.items():
-        rise = (height or 0.0) - scenario.surface.height - CONTACT_REACH[2]
+        # A contact point keeps its share of the weight up to a height of complementarity_max over that share.
+        loose = scenario.complementarity_max * len(robot.contacts) / robot.weight
+        rise = (height or 0.0) - scenario.surface.height - CONTACT_REACH[2] - loose
         if height is None or rise <= 0:
             continue
         lift_off, climb = math.sqrt(2 * gravity * rise), math.sqrt(2 * rise / gravity)

@@ -16,12 +16,15 @@ _THRUSTS, _THROTTLES = 801, 101  # how fine thrust and throttle are looked at
 
 
 def greatest_held(jet: Jet) -> float:
-    """Return the greatest thrust up to the jet's limit that some throttle within its range holds [N]; 0 if none."""
+    """Return the greatest thrust up to the jet's limit that some throttle within its range holds [N]; 0 if none.
+
+    It is rounded up by at most a `_THRUSTS`th of the limit.
+    """
     thrust = np.linspace(0.0, jet.thrust_max, _THRUSTS)[:, None]
     throttle = np.linspace(jet.throttle_min, jet.throttle_max, _THROTTLES)
     acceleration = jet.model.acceleration(thrust, 0.0, throttle)
     held = (acceleration.min(axis=1) <= 0) & (acceleration.max(axis=1) >= 0)
-    return float(thrust[held].max(initial=0.0))
+    return min(float(thrust[held].max()) + jet.thrust_max / (_THRUSTS - 1), jet.thrust_max) if held.any() else 0.0
 
 
 def spool_up(jets: Sequence[Jet], times: Array) -> Array:
@@ -38,7 +41,6 @@ def _spool_up(jet: Jet, times: Array) -> Array:
         "x": cs.vertcat(thrust, rate),
         "ode": cs.vertcat(rate, jet.model.acceleration(thrust, rate, jet.throttle_max)),
     }
-    # It goes on only to the greatest thrust, beyond which the model says nothing.
     options = {"abstol": 1e-6, "reltol": 1e-6, "show_eval_warnings": False}
     integrator = cs.integrator("spool_up", "cvodes", ode, 0.0, times.tolist(), options)
     try:

@@ -1,4 +1,4 @@
-"""Do the weights name what exists, and are costs and variables of sizes that the solver can tell apart?"""
+"""Whether weights name what exists, and costs and variables have sizes that the solver can tell apart."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def groups(task: Task) -> Iterator[Symptom]:
 
 
 def costs(task: Task) -> Iterator[Symptom]:
-    """Compare weight × size² of each cost, with the solver's scales as sizes, among each other and with the solver's."""
+    """Compare costs, weight × size² in the solver's units, with each other and with what the solver gets on with."""
     sizes = dict(_sizes(task.scenario.weights))
     if not task.robot.jets:
         idle = [name for name in _JETS if sizes.pop(name, 0.0)]
