@@ -58,13 +58,13 @@ def test_a_scenario_is_shown_as_toml_changed_and_read_back(tmp_path):
 
 def test_a_changed_scenario_is_solved_and_kept_in_the_file(tmp_path):
     (tmp_path / "my_task.toml").write_text(
-        'based_on = "take-off"\nknots = 5\n[surface]\nkind = "plane"\nslope = 0.05\n'
+        'based_on = "take-off"\nknots = 5\ninterval_max = 1.0\n[surface]\nkind = "plane"\nslope = 0.05\n'
     )
     result = run("solve", "my_task.toml", "--set", "final_com_height=0.6", "--max-iterations", 2, cwd=tmp_path)
     assert "5 knots" in result.stdout
     file = tmp_path / "results" / "my_task" / "trajectory.npz"
     kept = stored(Trajectory.load(file))
-    assert kept == replace(scenarios.take_off(), name="my_task", knots=5, surface=Plane(slope=0.05),
+    assert kept == replace(scenarios.take_off(), name="my_task", knots=5, interval_max=1.0, surface=Plane(slope=0.05),
                            final_com=(0.0, 0.0, 0.6))  # fmt: skip
     assert run("show", file).stdout == scenario_files.to_toml(kept)
 

@@ -196,6 +196,12 @@ def test_spooling_up_agrees_with_small_steps_of_its_equation(ironcub):
                     assert value == pytest.approx(thrust, rel=5e-3)
 
 
+def test_a_turbine_whose_model_runs_away_counts_as_there_and_says_nothing(ironcub, capfd):
+    wild = replace(ironcub.jets[0], model=replace(ironcub.jets[0].model, K_DD=5.0, B_U=50.0))
+    assert spool_up([wild], np.array([0.05, 1.0])).tolist() == [[160.0, 160.0]]
+    assert capfd.readouterr() == ("", "")
+
+
 def test_a_posture_without_a_trim_is_bent_into_one_with(ironcub):
     task = Task.of(ironcub, scenarios.take_off())
     before = residual(task, upright(task), feet=False, thrusts=task.thrusts_held)
@@ -221,6 +227,13 @@ def test_a_robot_whose_com_is_beside_its_feet_has_no_support(tmp_path):
 
 
 # ------------------------------------------------------------------------------------------ other robots
+
+
+def test_a_drone_whose_jets_are_a_little_askew_is_warned_of_in_silence(tmp_path, capfd):
+    """Within its tolerance of upright it may still hover; that the search has too few unknowns is not to be seen."""
+    (warning,) = mt.doctor(drone(tmp_path, tilt="3.13 0 0"), hop()).of(Severity.WARNING)
+    assert warning.name == "hover trim"
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_drone_without_joints_hops(tmp_path):

@@ -1,7 +1,7 @@
 """The command line, `multimodal-to`: the only part of the library that prints.
 
 Exit status: 0 when done, 1 when a solve ended without an answer, an audit found something or a simulated
-robot fell, 2 on bad input.
+robot fell, 2 on bad input or a hopeless task.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ def trim(task: Task) -> Iterator[Symptom]:
             yield warning(
                 "hover trim",
                 f"no posture was found in which the thrusts hold the robot upright at the {when}, with the CoM at "
-                f"{com} m; in the posture that it starts from they leave {here} over",
+                f"{com} m; in the posture that the problem is built around they leave {here} over",
                 "look at where the jets point, their greatest thrusts and the joints' ranges, and whether the feet are "
                 "clear of the ground there",
             )

@@ -53,8 +53,11 @@ def search(
     )
     world = task.world
     asked = [function(knot, world) for function in rows]
+    variables = cs.vertcat(position, joints, thrust)
+    if sum(some.expression.shape[0] for some in asked if some.lower == some.upper) > variables.shape[0]:
+        return None  # more equations than unknowns, as for a robot with few joints
     problem = {
-        "x": cs.vertcat(position, joints, thrust),
+        "x": variables,
         "f": objective(knot),
         "g": cs.vertcat(*(some.expression / some.scale for some in asked)),
     }

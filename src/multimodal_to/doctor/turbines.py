@@ -41,7 +41,7 @@ def _spool_up(jet: Jet, times: Array) -> Array:
         "x": cs.vertcat(thrust, rate),
         "ode": cs.vertcat(rate, jet.model.acceleration(thrust, rate, jet.throttle_max)),
     }
-    options = {"abstol": 1e-6, "reltol": 1e-6, "show_eval_warnings": False}
+    options = {"abstol": 1e-6, "reltol": 1e-6, "show_eval_warnings": False, "disable_internal_warnings": True}
     integrator = cs.integrator("spool_up", "cvodes", ode, 0.0, times.tolist(), options)
     try:
         reached = np.array(integrator(x0=[0.0, 0.0])["xf"])[0]
