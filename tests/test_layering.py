@@ -11,7 +11,7 @@ import multimodal_to
 
 ROOT = Path(multimodal_to.__file__).parent
 FLOORS = [
-    {"errors", "published"},
+    {"errors", "published", "machine"},
     {"reading", "writing"},
     {"trajectory"},
     {"resampling"},
@@ -40,6 +40,7 @@ OCP_FLOORS = [
     {"transcription", "solvers"},
     {"stages"},
     {"problem"},
+    {"record"},
     {"solution"},
     {"__init__"},
 ]

@@ -33,17 +33,27 @@ def test_the_file_holds_no_pickle_and_the_names_that_others_use(trajectory, tmp_
         assert archive["contact_forces"].shape == (24, trajectory.knots + 1)
 
 
-def test_files_of_the_first_version_are_read_and_those_of_a_later_release_refused(trajectory, tmp_path):
-    path = replace(trajectory, scenario_json="{}").save(tmp_path / "motion.npz")
+def test_files_of_earlier_versions_are_read_and_those_of_a_later_release_refused(trajectory, tmp_path):
+    path = replace(trajectory, scenario_json="{}", solve_json='{"status": "optimal"}').save(tmp_path / "motion.npz")
     with np.load(path) as archive:
         arrays = {name: archive[name] for name in archive.files}
     assert Trajectory.load(path).scenario_json == "{}"
-    np.savez(path, **{**arrays, "format_version": np.array(3)})
-    with pytest.raises(TrajectoryError, match="has format version 3; this release reads 1 to 2"):
+    assert Trajectory.load(path).solve_record() == {"status": "optimal"}
+    np.savez(path, **{**arrays, "format_version": np.array(4)})
+    with pytest.raises(TrajectoryError, match="has format version 4; this release reads 1 to 3"):
         Trajectory.load(path)
+    del arrays["solve_json"]
+    np.savez(path, **{**arrays, "format_version": np.array(2)})
+    assert (Trajectory.load(path).scenario_json, Trajectory.load(path).solve_record()) == ("{}", {})
     del arrays["scenario_json"]
     np.savez(path, **{**arrays, "format_version": np.array(1)})
     assert Trajectory.load(path).scenario_json == ""
+
+
+@pytest.mark.parametrize("text", ["[]", "optimal", "{", "[" * 100_000])
+def test_a_record_of_a_solve_that_is_no_json_object_is_refused(trajectory, text):
+    with pytest.raises(TrajectoryError, match=r"the record of the solve of 'take-off & hover' is no JSON"):
+        replace(trajectory, solve_json=text).solve_record()
 
 
 def test_a_missing_file_is_named(tmp_path):

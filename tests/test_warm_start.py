@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -46,3 +47,14 @@ def test_a_changed_target_and_another_grid_end_where_a_cold_solve_does(ironcub, 
 def test_a_motion_with_other_jets_is_refused(ironcub, answer):
     with pytest.raises(InputError, match="the jets of the motion to start from are"):
         mt.build(ironcub, replace(mt.scenarios.take_off(), knots=5)).start_from(answer.trajectory)
+
+
+def test_the_answer_keeps_how_it_was_solved(answer):
+    record = answer.trajectory.solve_record()
+    assert (record["kind"], record["status"], record["message"]) == ("answer", "optimal", "Solve_Succeeded")
+    assert (record["iterations"], record["objective"]) == (answer.iterations, answer.objective)
+    assert (record["costs"], record["violations"]) == (answer.costs, answer.violations)
+    assert record["linear_solver"] == "mumps"
+    assert record["threads"]["blas"] == 1
+    assert re.fullmatch(r"3\.\d+\.\d+", record["versions"]["ipopt"])
+    assert {"multimodal-to", "casadi", "numpy", "python"} <= set(record["versions"])

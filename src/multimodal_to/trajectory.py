@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 import zipfile
@@ -17,8 +18,8 @@ from numpy.typing import NDArray
 
 from multimodal_to.errors import OutputError, TrajectoryError
 
-FORMAT_VERSION = 2
-"""Version 1 lacks `scenario_json`; it is read all the same."""
+FORMAT_VERSION = 3
+"""Version 1 lacks `scenario_json`, versions 1 and 2 lack `solve_json`; they are read all the same."""
 
 Array = NDArray[np.float64]
 
@@ -98,6 +99,7 @@ class Trajectory:
     throttle: Array
 
     scenario_json: str = ""  # the complete scenario, as `ocp.scenario_data` writes it; empty where none is known
+    solve_json: str = ""  # how it was solved, as `ocp.record` writes it; empty where no solver made it
 
     def __post_init__(self) -> None:
         if self.time.ndim != 1 or self.time.size < 2:
@@ -123,6 +125,20 @@ class Trajectory:
         """Return the time from the first knot to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
+    def solve_record(self) -> dict[str, Any]:
+        """Return how the trajectory was solved, by the keys of `ocp.record`; empty where that is not known.
+
+        Raises:
+            TrajectoryError: `solve_json` is no JSON object.
+        """
+        try:
+            record = json.loads(self.solve_json or "{}")
+        except (ValueError, RecursionError) as error:
+            raise TrajectoryError(f"the record of the solve of '{self.scenario}' is no JSON: {error}") from error
+        if not isinstance(record, dict):
+            raise TrajectoryError(f"the record of the solve of '{self.scenario}' is no JSON object")
+        return record
+
     def per_contact(self, name: str) -> Array:
         """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1)."""
         rows = QUANTITIES[name].rows
@@ -144,6 +160,7 @@ class Trajectory:
             "robot": np.array(self.robot),
             "scenario": np.array(self.scenario),
             "scenario_json": np.array(self.scenario_json),
+            "solve_json": np.array(self.solve_json),
             "time": self.time,
             "knots": np.array(self.knots),
             "total_time": np.array(self.duration),
@@ -185,7 +202,7 @@ class Trajectory:
             if stored[name].dtype.kind not in "fiu":
                 raise TrajectoryError(f"'{source}': '{name}' is not numeric")
         fields: dict[str, Any] = {"robot": str(stored["robot"]), "scenario": str(stored["scenario"])}
-        fields["scenario_json"] = str(stored.get("scenario_json", ""))
+        fields |= {name: str(stored.get(name, "")) for name in ("scenario_json", "solve_json")}
         fields |= {name: tuple(str(label) for label in np.atleast_1d(stored[name])) for name in _LABELS}
         fields |= {name: np.asarray(stored[name], dtype=float) for name in ("time", *QUANTITIES)}
         return cls(**fields)

@@ -11,9 +11,12 @@ import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
+from multimodal_to import machine
 from multimodal_to.errors import SolverError
 from multimodal_to.models.terrain import SURFACES
 from multimodal_to.ocp.problem import Problem
+from multimodal_to.ocp.record import Kind
+from multimodal_to.ocp.record import to_json as record_json
 from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.ocp.scenario_data import to_json
 from multimodal_to.ocp.solvers import Ipopt, Phase, Status
@@ -47,7 +50,7 @@ class Solution:
     units: dict[str, str] = field(repr=False)  # of the violations
     iterations: int
     solve_time: float  # wall time in the solver [s]
-    statistics: dict[str, Any] = field(repr=False)  # the solver's own
+    statistics: dict[str, Any] = field(repr=False)  # the solver's own, `threads` and `versions`
 
     @property
     def largest_violation(self) -> tuple[str, float, str]:
@@ -90,17 +93,25 @@ def solve(
         left = max(solver.max_iterations - iterations, 1)
         options = solver.options(left, seconds, phase)
         watcher = None if progress is None else _Watcher(problem, progress, started, iterations)
-        x, statistics = _run(problem, x, options, watcher, phase)
+        with machine.one_blas_thread():
+            x, statistics = _run(problem, x, options, watcher, phase)
+            statistics |= {"threads": machine.threads(), "versions": machine.versions()}
         iterations += int(statistics["iter_count"])
         message = str(statistics["return_status"])
         status = Ipopt.status(message)
         if status in (Status.TIME_LIMIT, Status.STOPPED) or iterations >= solver.max_iterations:
             break
     violations, costs = problem.largest_violations(x), problem.costs(x)
+    objective, seconds = sum(costs.values()), time.perf_counter() - started
+    solve_json = record_json(
+        kind=Kind.ANSWER, status=status.value, message=message, iterations=iterations, solve_time=seconds,
+        objective=objective, costs=costs, violations=violations, linear_solver=options["linear_solver"],
+        versions=statistics["versions"], threads=statistics["threads"],
+    )  # fmt: skip
     return Solution(
-        status=status, solver_message=message, trajectory=_trajectory(problem, x), objective=sum(costs.values()),
+        status=status, solver_message=message, trajectory=_trajectory(problem, x, solve_json), objective=objective,
         costs=costs, violations=violations, units={name: problem.unit(name) for name in violations},
-        iterations=iterations, solve_time=time.perf_counter() - started, statistics=statistics,
+        iterations=iterations, solve_time=seconds, statistics=statistics,
     )  # fmt: skip
 
 
@@ -146,7 +157,7 @@ def _check_bounds(problem: Problem, statistics: dict[str, Any]) -> None:
         raise SolverError(f"CasADi took {found.sum()} rows for bounds, where {expected.sum()} are")
 
 
-def _trajectory(problem: Problem, x: Array) -> Trajectory:
+def _trajectory(problem: Problem, x: Array, solve_json: str) -> Trajectory:
     """Return the trajectory of x: the variables in their own units, and the differences that are their rates."""
     own = x * problem.scale
     values = {name: np.array(value) for name, value in problem.layout.read_horizon(own).items()}
@@ -158,8 +169,8 @@ def _trajectory(problem: Problem, x: Array) -> Trajectory:
         return difference
 
     return Trajectory(
-        robot=robot.name, scenario=problem.scenario.name, scenario_json=_kept(problem.scenario), time=time_grid,
-        joint_names=robot.joint_names, contact_names=robot.contact_names, jet_names=robot.jet_names,
+        robot=robot.name, scenario=problem.scenario.name, scenario_json=_kept(problem.scenario), solve_json=solve_json,
+        time=time_grid, joint_names=robot.joint_names, contact_names=robot.contact_names, jet_names=robot.jet_names,
         com_acceleration=rate("com_velocity"), angular_momentum_rate=rate("angular_momentum"),
         contact_force_rates=rate("contact_forces"), thrust_acceleration=rate("thrust_rate"), **values,
     )  # fmt: skip

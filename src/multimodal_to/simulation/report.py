@@ -144,7 +144,7 @@ def simulated_trajectory(playback: Playback) -> Trajectory:
         "thrust_rate": playback.thrust_rate[rows].T,
         "throttle": _means(playback.throttle, rows),
     }
-    motion = replace(plan, scenario=f"{plan.scenario} in MuJoCo", **arrays)
+    motion = replace(plan, scenario=f"{plan.scenario} in MuJoCo", solve_json="", **arrays)
     poses = np.hstack(list(base_poses(motion)))
     points = contact_points(robot, motion)
     momenta = np.array(robot.kindyn.centroidal_momentum_fun().map(grid.size)(poses, qpos[7:], qvel[:6], qvel[6:]))
