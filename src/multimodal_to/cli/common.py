@@ -29,6 +29,9 @@ out = Console(highlight=False)
 
 File = Annotated[Path, typer.Argument(help="Trajectory file, as `solve` writes it.")]
 ScenarioName = Annotated[str, typer.Argument(help="Scenario, as `list` shows it, or a TOML file of one.")]
+OptionalName = Annotated[
+    str | None, typer.Argument(metavar="NAME", help="The same; not needed with --resume.", show_default=False)
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in --set final_com_height=0.8; repeatable."),

@@ -15,7 +15,7 @@ _LINE_EVERY = 5.0  # [s] between progress lines where the output is no terminal
 
 
 class Progress:
-    """Shows where a solve stands, and ends it cleanly on Ctrl-C."""
+    """Shows where a solve stands, and ends it cleanly on Ctrl-C; a second one ends the process at once."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -49,3 +49,5 @@ class Progress:
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         self.interrupted = True
+        self._console.show_cursor()  # whatever comes next
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # which needs no Python to run, and the solver may not let it

@@ -13,8 +13,19 @@ from rich.console import Console
 from rich.table import Column, Table
 
 from multimodal_to.audit import Audit, audit
-from multimodal_to.cli.common import RobotOption, ScenarioName, Settings, app, chosen, described, out, writable
+from multimodal_to.cli.common import (
+    OptionalName,
+    RobotOption,
+    ScenarioName,
+    Settings,
+    app,
+    chosen,
+    described,
+    out,
+    writable,
+)
 from multimodal_to.cli.progress import Progress
+from multimodal_to.cli.tasks import free_checkpoint, given
 from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
 from multimodal_to.errors import ScenarioError
@@ -107,33 +118,43 @@ def _refuse_hopeless(diagnosis: Diagnosis, console: Console, force: bool) -> Non
 
 @app.command()
 def solve(
-    name: ScenarioName,
+    name: OptionalName = None,
     settings: Settings = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder for the results; made if missing. [results/NAME]")
     ] = None,
-    robot: RobotOption = "ironcub",
+    robot: Annotated[
+        str, typer.Option("--robot", help="Bundled robot by name, or a robot's folder. [ironcub, or the file's]")
+    ] = "",
     max_iterations: Annotated[int, typer.Option(help="Give up after so many iterations.")] = 1000,
     time_limit: Annotated[float, typer.Option(help="Give up after so many seconds in the solver.")] = 3600.0,
     warm_start: Annotated[
         Path | None, typer.Option(help="Trajectory of a task much like this one to start from, for a faster answer.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Try a task that the doctor calls hopeless.")] = False,
+    resume: Annotated[
+        Path | None, typer.Option(help="Checkpoint or trajectory of an unfinished solve to go on from, beside it.")
+    ] = None,
+    checkpoint: Annotated[
+        bool, typer.Option(help="Keep the best iterate in checkpoint.npz while the solve runs.")
+    ] = True,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Solve a scenario; write the trajectory, its plot and its replay page.
 
-    The doctor looks at it first: a hopeless task is refused with exit status 2, and nothing is written.
+    The doctor looks at it first: a hopeless task is refused with exit status 2, and nothing is written. Ctrl-C ends the
+    solve with its best iterate, twice at once.
 
     Example: multimodal-to solve take-off --set final_com_height=0.8 --set weights.thrust=3 --output results/higher
+
+    Example: multimodal-to solve --resume results/take-off/checkpoint.npz
     """
-    scenario = chosen(name, settings)
-    solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit)
-    start = None if warm_start is None else Trajectory.load(warm_start)
+    task = given(name, settings, robot, warm_start=warm_start, resume=resume)
+    scenario, solver = task.scenario, Ipopt(max_iterations=max_iterations, time_limit=time_limit)
     console = Console(highlight=False, quiet=quiet)
-    the_robot = load_robot(robot)
+    the_robot = load_robot(task.robot)
     _refuse_hopeless(examine(the_robot, scenario), console, force)
-    folder = writable(output or Path("results") / scenario.name)
+    folder = writable(output or (Path("results") / scenario.name if resume is None else resume.parent))
     started = time.perf_counter()
     problem = build(the_robot, scenario)
     the_robot = problem.robot  # with the jets that the scenario uses
@@ -142,15 +163,18 @@ def solve(
         f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s",
         soft_wrap=True,
     )
+    kept = free_checkpoint(folder, resume, console) if checkpoint else None
     with Progress(console) as progress:
-        solution = run_solver(problem, solver, progress, start=start)
+        solution = run_solver(problem, solver, progress, start=task.start, checkpoint=kept)
+    written = [solution.trajectory.save(folder / "trajectory.npz")]
+    if kept is not None:
+        kept.unlink(missing_ok=True)
     report = audit(the_robot, solution.trajectory, scenario)
     _summarise(console, solution, report)
 
     from multimodal_to.plotting import plot_forces, save  # viewers take a second to import, other commands need none
     from multimodal_to.replay import write_html
 
-    written = [solution.trajectory.save(folder / "trajectory.npz")]
     written.append(save(plot_forces(the_robot, solution.trajectory), folder / "forces.png"))
     written.append(write_html(the_robot, solution.trajectory, folder / "replay.html"))
     for path in written:
@@ -167,6 +191,9 @@ def _summarise(console: Console, solution: Solution, report: Audit) -> None:
         f"violation {violation:.1e} {unit} ({name})\n{described(report)}",
         soft_wrap=True,
     )
+    if not solution.status.solved:
+        feasible = "feasible" if solution.feasible else "not feasible"
+        console.print(f"the trajectory is the best iterate, of iteration {solution.iteration}: {feasible}")
     failed = [finding for finding in report.findings if not finding.holds]
     for finding in failed:
         console.print(

@@ -73,12 +73,25 @@ class Problem:
         x = np.append(values.ravel(order="F"), trajectory.duration / knots) / self.scale
         return np.clip(x, self.lower, self.upper)
 
-    def largest_violations(self, x: Array) -> dict[str, float]:
-        """Return by how much each set of rows, and each variable's bounds, are missed at x, in their own units."""
-        g = np.array(self.nlp.rows(x)).ravel()
-        missed = np.maximum(np.maximum(self.row_lower - g, g - self.row_upper), 0.0)
+    def rows_at(self, x: Array) -> Array:
+        """Return g(x), in solver units."""
+        return np.array(self.nlp.rows(x)).ravel()
+
+    def scaled_violation(self, x: Array, g: Array) -> float:
+        """Return the largest violation of all rows g = g(x) and bounds, in solver units."""
+        missed = _missed(g, self.row_lower, self.row_upper).max(initial=0.0)
+        return float(max(missed, _missed(x, self.lower, self.upper).max(initial=0.0)))
+
+    def largest_violations(self, x: Array, g: Array | None = None) -> dict[str, float]:
+        """Return by how much each set of rows, and each variable's bounds, are missed at x, in their own units.
+
+        Args:
+            x: all variables, in solver units.
+            g: the rows at x where they are known already.
+        """
+        missed = _missed(self.rows_at(x) if g is None else g, self.row_lower, self.row_upper)
         report = {name: float(missed[rows.index].max() * rows.scale) for name, rows in self.rows.items()}
-        outside = np.maximum(np.maximum(self.lower - x, x - self.upper), 0.0) * self.scale
+        outside = _missed(x, self.lower, self.upper) * self.scale
         for name, values in self.layout.read_horizon(outside).items():
             report[f"bounds of {name}"] = float(values.max(initial=0.0))
         report["bounds of interval"] = float(outside[-1])
@@ -156,6 +169,11 @@ def formulate(robot: Robot, scenario: Scenario, standing: Posture) -> tuple[Layo
     stages = collect(World.of(robot, scenario, standing), scenario, layout, bounds)
     set_boundary(bounds, robot, scenario, standing)
     return layout, bounds, stages
+
+
+def _missed(values: Array, lower: Array, upper: Array) -> Array:
+    """Return by how much values are below or above their limits, else zero; what is not a number stays none."""
+    return np.maximum(np.maximum(lower - values, values - upper), 0.0)
 
 
 def _standing(robot: Robot, scenario: Scenario) -> Posture:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -13,12 +14,11 @@ from numpy.typing import NDArray
 
 from multimodal_to import machine
 from multimodal_to.errors import SolverError
-from multimodal_to.models.terrain import SURFACES
+from multimodal_to.ocp.best import Best, Checkpoint
+from multimodal_to.ocp.interrupts import Interrupts
+from multimodal_to.ocp.motion import motion
 from multimodal_to.ocp.problem import Problem
-from multimodal_to.ocp.record import Kind
-from multimodal_to.ocp.record import to_json as record_json
-from multimodal_to.ocp.scenario import Scenario
-from multimodal_to.ocp.scenario_data import to_json
+from multimodal_to.ocp.record import Kind, to_json
 from multimodal_to.ocp.solvers import Ipopt, Phase, Status
 from multimodal_to.trajectory import Trajectory
 
@@ -39,7 +39,11 @@ class Iterate:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solution:
-    """What a solve ended with: its verdict by name, and the trajectory."""
+    """What a solve ended with: its verdict by name, and the trajectory.
+
+    Without an answer the trajectory is the best iterate: of those that are feasible within `best.FEASIBLE` the one with
+    the lowest objective, and while none is, the one with the least violation.
+    """
 
     status: Status
     solver_message: str
@@ -49,6 +53,8 @@ class Solution:
     violations: dict[str, float]  # largest by name, recomputed from the problem, in their own units
     units: dict[str, str] = field(repr=False)  # of the violations
     iterations: int
+    iteration: int  # that the trajectory is from
+    feasible: bool
     solve_time: float  # wall time in the solver [s]
     statistics: dict[str, Any] = field(repr=False)  # the solver's own, `threads` and `versions`
 
@@ -69,54 +75,87 @@ def solve(
     progress: Progress | None = None,
     *,
     start: Trajectory | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> Solution:
     """Solve a problem from its start guess, or from a motion.
 
     A rough phase without the rows' curvature finds a motion that nearly meets the rows; from it the exact one finds
-    the answer.
+    the answer. Ctrl-C stops the solve as `progress` may, and what is returned is its best iterate.
 
     Args:
         problem: from `build`.
         solver: by default `Ipopt()`; its limits are for all solves together.
         progress: told of every iteration; it may stop the solve by returning True.
-        start: the answer of a problem much like this one, with any number of knots; without a rough phase.
+        start: the answer of a problem much like this one, with any number of knots, which needs no rough phase; or the
+            checkpoint of an unfinished solve, to go on from the phase it was in.
+        checkpoint: a trajectory file to keep the best iterate in while the solve runs; it stays there.
 
     Raises:
         InputError: the start is a motion of another robot.
+        TrajectoryError: what the start says of how it was solved is no JSON object.
         SolverError: the solver could not be run.
     """
     solver = solver or Ipopt()
     started, iterations = time.perf_counter(), 0
     x = problem.guess if start is None else problem.start_from(start)
-    for phase in (Phase.ROUGH, Phase.EXACT) if start is None else (Phase.WARM,):
+    phases = _phases(start)
+    environment = _environment(solver)
+    best = Best(problem, None if checkpoint is None else Checkpoint(checkpoint, environment))
+    if start is not None:
+        best.seed(x, phases[0])
+    status, message, statistics = Status.FAILED, "", dict[str, Any]()
+    for phase in phases:
         seconds = max(solver.time_limit - (time.perf_counter() - started), 1e-3)
         left = max(solver.max_iterations - iterations, 1)
         options = solver.options(left, seconds, phase)
-        watcher = None if progress is None else _Watcher(problem, progress, started, iterations)
-        with machine.one_blas_thread():
+        watcher = _Watcher(problem, best, progress, started, iterations, phase)
+        try:
             x, statistics = _run(problem, x, options, watcher, phase)
-            statistics |= {"threads": machine.threads(), "versions": machine.versions()}
+        except SolverError as error:
+            if not best.seen:
+                raise
+            status, message = Status.FAILED, str(error)  # what was found is kept
+            break
         iterations += int(statistics["iter_count"])
         message = str(statistics["return_status"])
         status = Ipopt.status(message)
         if status in (Status.TIME_LIMIT, Status.STOPPED) or iterations >= solver.max_iterations:
             break
-    violations, costs = problem.largest_violations(x), problem.costs(x)
-    objective, seconds = sum(costs.values()), time.perf_counter() - started
-    solve_json = record_json(
-        kind=Kind.ANSWER, status=status.value, message=message, iterations=iterations, solve_time=seconds,
-        objective=objective, costs=costs, violations=violations, linear_solver=options["linear_solver"],
-        versions=statistics["versions"], threads=statistics["threads"],
+    end = best.end(x, iterations, phase, answer=status.solved)
+    violations, costs = problem.largest_violations(end.x), problem.costs(end.x)
+    facts: dict[str, Any] = {
+        "iterations": iterations, "iteration": end.iteration, "feasible": end.feasible,
+        "objective": sum(costs.values()), "costs": costs, "violations": violations,
+        "solve_time": time.perf_counter() - started,
+    }  # fmt: skip
+    solve_json = to_json(
+        kind=Kind.ANSWER, status=status.value, message=message, phase=end.phase.value, **facts, **environment,
     )  # fmt: skip
     return Solution(
-        status=status, solver_message=message, trajectory=_trajectory(problem, x, solve_json), objective=objective,
-        costs=costs, violations=violations, units={name: problem.unit(name) for name in violations},
-        iterations=iterations, solve_time=seconds, statistics=statistics,
+        status=status, solver_message=message, trajectory=motion(problem, end.x, solve_json), **facts,
+        units={name: problem.unit(name) for name in violations}, statistics=statistics | environment,
     )  # fmt: skip
 
 
+def _environment(solver: Ipopt) -> dict[str, Any]:
+    """Return what the answer depends on beside the problem."""
+    options = solver.options(solver.max_iterations, solver.time_limit, Phase.EXACT)
+    with machine.one_blas_thread():
+        threads = machine.threads()
+    return {"linear_solver": options["linear_solver"], "threads": threads, "versions": machine.versions()}
+
+
+def _phases(start: Trajectory | None) -> tuple[Phase, ...]:
+    """Return the phases from a start: what no solve has made feasible goes on in the phase that it was in."""
+    record = {} if start is None else start.solve_record()
+    if start is None or (record.get("feasible") is False and record.get("phase") == Phase.ROUGH.value):
+        return Phase.ROUGH, Phase.EXACT
+    return (Phase.EXACT,) if record.get("feasible") is False else (Phase.WARM,)
+
+
+@machine.one_blas_thread()
 def _run(
-    problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher | None, phase: Phase
+    problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher, phase: Phase
 ) -> tuple[Array, dict[str, Any]]:
     """Run IPOPT once from x; return where it ended, answer or not, and its statistics."""
     opti = problem.opti
@@ -126,23 +165,25 @@ def _run(
         "jac_g": problem.nlp.jacobian,
         "grad_f": problem.nlp.gradient,
         "hess_lag": problem.nlp.cost_hessian if phase is Phase.ROUGH else problem.nlp.hessian,
+        "iteration_callback": watcher,
     }
-    if watcher is not None:
-        options["iteration_callback"] = watcher
     opti.solver("ipopt", options, ipopt_options)
     opti.set_initial(opti.x, x)
     failure: RuntimeError | None = None
-    try:
-        opti.solve_limited()
-    except RuntimeError as error:  # how Opti says that there is no solution, and everything else
-        failure = error
-    if watcher is not None and watcher.error is not None:
+    with watcher.interrupts:
+        try:
+            opti.solve_limited()
+        except RuntimeError as error:  # how Opti says that there is no solution, and everything else
+            failure = error
+    if watcher.error is not None:
         raise watcher.error
     try:
         statistics = dict(opti.debug.stats())
     except RuntimeError:  # no solver has run
         raise SolverError(f"the solver did not run: {failure}") from failure
     _check_bounds(problem, statistics)
+    if watcher.interrupts.asked:
+        statistics["return_status"] = "User_Requested_Stop"  # also where a second Ctrl-C broke an evaluation off
     return np.array(opti.debug.value(opti.x)).ravel(), statistics
 
 
@@ -157,36 +198,17 @@ def _check_bounds(problem: Problem, statistics: dict[str, Any]) -> None:
         raise SolverError(f"CasADi took {found.sum()} rows for bounds, where {expected.sum()} are")
 
 
-def _trajectory(problem: Problem, x: Array, solve_json: str) -> Trajectory:
-    """Return the trajectory of x: the variables in their own units, and the differences that are their rates."""
-    own = x * problem.scale
-    values = {name: np.array(value) for name, value in problem.layout.read_horizon(own).items()}
-    dt, robot = float(own[-1]), problem.robot
-    time_grid: Array = dt * np.arange(problem.scenario.knots + 1, dtype=np.float64)
-
-    def rate(name: str) -> Array:
-        difference: Array = np.diff(values[name], axis=1, prepend=values[name][:, :1]) / dt
-        return difference
-
-    return Trajectory(
-        robot=robot.name, scenario=problem.scenario.name, scenario_json=_kept(problem.scenario), solve_json=solve_json,
-        time=time_grid, joint_names=robot.joint_names, contact_names=robot.contact_names, jet_names=robot.jet_names,
-        com_acceleration=rate("com_velocity"), angular_momentum_rate=rate("angular_momentum"),
-        contact_force_rates=rate("contact_forces"), thrust_acceleration=rate("thrust_rate"), **values,
-    )  # fmt: skip
-
-
-def _kept(scenario: Scenario) -> str:
-    """Return the scenario as text; a surface of the user's own class cannot be written, and nothing is kept."""
-    return to_json(scenario) if type(scenario.surface) in SURFACES.values() else ""
-
-
 class _Watcher(cs.Callback):  # type: ignore[misc]
-    """CasADi's iteration callback: tells `progress` where the solve stands, and stops it when asked."""
+    """CasADi's iteration callback: shows every iterate to `best`, tells `progress`, and stops the solve when asked."""
 
-    def __init__(self, problem: Problem, progress: Progress, started: float, iteration: int) -> None:
+    def __init__(
+        self, problem: Problem, best: Best, progress: Progress | None, started: float, iteration: int, phase: Phase
+    ) -> None:
         cs.Callback.__init__(self)
-        self._problem, self._progress, self._started, self._iteration = problem, progress, started, iteration
+        self._problem, self._best, self._progress = problem, best, progress
+        self._started, self._iteration, self._phase = started, iteration, phase
+        self._rows_first: bool | None = None
+        self.interrupts = Interrupts()
         self.error: Exception | None = None
         self.construct("watcher")
 
@@ -207,19 +229,37 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
 
     def eval(self, arguments: list[Any]) -> list[int]:
         try:
-            return [int(bool(self._progress(self._iterate(arguments))))]
+            return [int(self._watch(arguments) or self.interrupts.asked)]
+        except KeyboardInterrupt:  # the second Ctrl-C
+            return [1]
         except Exception as error:  # it is raised once the solver has returned
             self.error = error
             return [1]
 
-    def _iterate(self, arguments: list[Any]) -> Iterate:
+    def _watch(self, arguments: list[Any]) -> bool:
         values = dict(zip((cs.nlpsol_out(index) for index in range(len(arguments))), arguments, strict=True))
-        x = np.array(values["x"]).ravel()
-        violations = self._problem.largest_violations(x)
-        worst = max(violations, key=violations.__getitem__)
-        iterate = Iterate(
-            iteration=self._iteration, objective=float(values["f"]), worst=worst, violation=violations[worst],
-            unit=self._problem.unit(worst), elapsed=time.perf_counter() - self._started,
-        )  # fmt: skip
+        x, objective, iteration = values["x"].full().ravel(), float(values["f"]), self._iteration
+        rows = self._rows(x, values["g"])
         self._iteration += 1
-        return iterate
+        self._best.show(x, rows, objective, iteration, self._phase)
+        if self._progress is None:
+            return False
+        violations = self._problem.largest_violations(x, rows)
+        worst = max(violations, key=violations.__getitem__)
+        return bool(self._progress(Iterate(
+            iteration=iteration, objective=objective, worst=worst, violation=violations[worst],
+            unit=self._problem.unit(worst), elapsed=time.perf_counter() - self._started,
+        )))  # fmt: skip
+
+    def _rows(self, x: Array, g: cs.DM) -> Array:
+        """Return the rows at x, without evaluating them again where CasADi hands them over.
+
+        With bounds taken out of g, it leaves the rows in the first places of g and nothing in the others. That is not
+        documented, so it is looked at in the first iterate.
+        """
+        if self._rows_first is False:
+            return self._problem.rows_at(x)
+        first: Array = g[: self._problem.row_lower.size].full().ravel()
+        if self._rows_first is None:
+            self._rows_first = np.array_equal(first, self._problem.rows_at(x))
+        return first if self._rows_first else self._problem.rows_at(x)

@@ -1,0 +1,62 @@
+"""What `solve` is given to do: a scenario, or an unfinished solve; and the checkpoint that it keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from multimodal_to.cli.common import chosen
+from multimodal_to.errors import InputError, ScenarioError
+from multimodal_to.ocp.scenario import Scenario
+from multimodal_to.ocp.scenario_data import stored
+from multimodal_to.scenario_files import change
+from multimodal_to.trajectory import Trajectory
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Task:
+    """A scenario for a robot, by its name or folder, and the motion to start from."""
+
+    scenario: Scenario
+    robot: str
+    start: Trajectory | None
+
+
+def given(
+    name: str | None, settings: list[str] | None, robot: str, *, warm_start: Path | None, resume: Path | None
+) -> Task:
+    """Return the task that the options of `solve` ask for.
+
+    Raises:
+        InputError: they contradict each other, or none of them is a task.
+        ScenarioError: the file to go on from keeps no scenario.
+    """
+    if resume is None:
+        if name is None:
+            raise InputError("nothing to solve; expected the NAME of a scenario, or --resume FILE")
+        start = None if warm_start is None else Trajectory.load(warm_start)
+        return Task(scenario=chosen(name, settings), robot=robot or "ironcub", start=start)
+    if warm_start is not None:
+        raise InputError("--resume and --warm-start both say what to start from; expected one of them")
+    start = Trajectory.load(resume)
+    scenario = stored(start)
+    if scenario is None:
+        raise ScenarioError(f"'{resume}' keeps no scenario to go on with; name one and start from it by --warm-start")
+    asked = change(scenario, settings or ()) if name is None else chosen(name, settings)
+    if asked != scenario:
+        raise InputError(
+            f"'{resume}' is of '{scenario.name}' with other values than asked for; --resume goes on with its own, "
+            "--warm-start starts a changed task from it"
+        )
+    return Task(scenario=scenario, robot=robot or start.robot, start=start)
+
+
+def free_checkpoint(folder: Path, resume: Path | None, console: Console) -> Path:
+    """Return where the checkpoint goes; one that an earlier solve left is moved aside, unless it is gone on from."""
+    path = folder / "checkpoint.npz"
+    if path.exists() and not (resume is not None and path.samefile(resume)):
+        aside = path.replace(folder / "checkpoint-before.npz")
+        console.print(f"an unfinished solve left {path}; it is kept as {aside}", soft_wrap=True)
+    return path

@@ -1,0 +1,34 @@
+"""Ctrl-C during a solve, which spends its time in compiled code."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType
+
+
+class Interrupts:
+    """While entered, the first Ctrl-C is noted in `asked` instead of raising; the next one raises again.
+
+    An exception raised between CasADi's calls would end as a failure of the solver, and its iterate would be lost.
+    A program that handles Ctrl-C in a way of its own is left to it, and so is a thread that is not the main one.
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._entered = False
+
+    def __enter__(self) -> Interrupts:
+        main = threading.current_thread() is threading.main_thread()
+        self._entered = main and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if self._entered:
+            signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._entered:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self.asked = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)
