@@ -15,7 +15,7 @@ _LINE_EVERY = 5.0  # [s] between progress lines where the output is no terminal
 
 
 class Progress:
-    """Shows where a solve stands, and ends it cleanly on Ctrl-C; a second one ends the process at once."""
+    """Shows where a solve stands, and ends it cleanly on Ctrl-C; a second one, also later, ends the process at once."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -34,6 +34,8 @@ class Progress:
         elif iterate.elapsed - self._printed >= _LINE_EVERY:
             self._printed = iterate.elapsed
             self._console.print(line, soft_wrap=True)
+        if self.interrupted:
+            self._console.print("stopping; Ctrl-C again ends the process at once")
         return self.interrupted
 
     def __enter__(self) -> Progress:
@@ -45,7 +47,8 @@ class Progress:
     def __exit__(self, *_: object) -> None:
         if self._console.is_terminal:
             self._live.stop()
-        signal.signal(signal.SIGINT, self._before)
+        if not self.interrupted:
+            signal.signal(signal.SIGINT, self._before)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         self.interrupted = True

@@ -29,7 +29,7 @@ from multimodal_to.cli.tasks import free_checkpoint, given
 from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
 from multimodal_to.errors import ScenarioError
-from multimodal_to.models.robot import load_robot
+from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.ocp import Ipopt, Solution, build
 from multimodal_to.ocp import solve as run_solver
 from multimodal_to.ocp.scenario import Scenario
@@ -171,16 +171,21 @@ def solve(
         kept.unlink(missing_ok=True)
     report = audit(the_robot, solution.trajectory, scenario)
     _summarise(console, solution, report)
-
-    from multimodal_to.plotting import plot_forces, save  # viewers take a second to import, other commands need none
-    from multimodal_to.replay import write_html
-
-    written.append(save(plot_forces(the_robot, solution.trajectory), folder / "forces.png"))
-    written.append(write_html(the_robot, solution.trajectory, folder / "replay.html"))
+    if not progress.interrupted:  # who stops a solve does not want to wait for pictures
+        written += _draw(the_robot, solution.trajectory, folder)
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)
     if not solution.status.solved:
         raise typer.Exit(1)
+
+
+def _draw(robot: Robot, trajectory: Trajectory, folder: Path) -> list[Path]:
+    """Write plot and replay page; return their paths."""
+    from multimodal_to.plotting import plot_forces, save  # viewers take a second to import, other commands need none
+    from multimodal_to.replay import write_html
+
+    forces = save(plot_forces(robot, trajectory), folder / "forces.png")
+    return [forces, write_html(robot, trajectory, folder / "replay.html")]
 
 
 def _summarise(console: Console, solution: Solution, report: Audit) -> None:
