@@ -34,15 +34,15 @@ OCP_FLOORS = [
     {"scenario"},
     {"scenario_data"},
     {"variables", "integrators"},
-    {"gait"},
+    {"gait", "naming"},
     {"constraints", "guess"},
     {"costs", "boundary"},
     {"transcription", "solvers", "interrupts"},
     {"stages"},
     {"problem", "record"},
-    {"motion"},
+    {"motion", "misses"},
     {"best"},
-    {"solution"},
+    {"solution", "elastic"},
     {"__init__"},
 ]
 

@@ -30,13 +30,15 @@ from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Robot, load_robot
-from multimodal_to.ocp import Ipopt, Solution, build
+from multimodal_to.ocp import Ipopt, Relaxation, Solution, build, relax
 from multimodal_to.ocp import solve as run_solver
 from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.ocp.scenario_data import stored, to_dict
 from multimodal_to.scenario_files import change, to_toml
 from multimodal_to.scenarios import SCENARIOS, find
 from multimodal_to.trajectory import Trajectory
+
+_MISSES_SHOWN = 5
 
 
 @app.command("list")
@@ -138,6 +140,9 @@ def solve(
     checkpoint: Annotated[
         bool, typer.Option(help="Keep the best iterate in checkpoint.npz while the solve runs.")
     ] = True,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Where there is no answer, find out which rows have to give way.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Solve a scenario; write the trajectory, its plot and its replay page.
@@ -171,12 +176,25 @@ def solve(
         kept.unlink(missing_ok=True)
     report = audit(the_robot, solution.trajectory, scenario)
     _summarise(console, solution, report)
+    if explain and not solution.status.solved and not progress.interrupted:
+        _explain(console, relax(problem, solution.trajectory, solver))
     if not progress.interrupted:  # who stops a solve does not want to wait for pictures
         written += _draw(the_robot, solution.trajectory, folder)
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)
     if not solution.status.solved:
         raise typer.Exit(1)
+
+
+def _explain(console: Console, relaxation: Relaxation) -> None:
+    """Say what has to give way, or that nothing has to."""
+    spent = f"{relaxation.iterations} iterations in {relaxation.solve_time:.1f} s"
+    if not relaxation.status.solved:
+        console.print(f"explain: found nothing for certain in {spent}: {relaxation.status.value}", soft_wrap=True)
+    elif not relaxation.gives_way:
+        console.print(f"explain: nothing has to give way, all rows can be met together ({spent})", soft_wrap=True)
+    for miss in relaxation.gives_way:
+        console.print(f"explain: gives way: {miss}", soft_wrap=True)
 
 
 def _draw(robot: Robot, trajectory: Trajectory, folder: Path) -> list[Path]:
@@ -199,6 +217,8 @@ def _summarise(console: Console, solution: Solution, report: Audit) -> None:
     if not solution.status.solved:
         feasible = "feasible" if solution.feasible else "not feasible"
         console.print(f"the trajectory is the best iterate, of iteration {solution.iteration}: {feasible}")
+        for miss in solution.misses[:_MISSES_SHOWN]:
+            console.print(f"missed: {miss}", soft_wrap=True)
     failed = [finding for finding in report.findings if not finding.holds]
     for finding in failed:
         console.print(

@@ -1,5 +1,7 @@
 """The optimal control problem: scenarios, variables, constraints and costs, their transcription, and its solution."""
 
+from multimodal_to.ocp.elastic import Relaxation, relax
+from multimodal_to.ocp.misses import Miss
 from multimodal_to.ocp.problem import Problem, build
 from multimodal_to.ocp.scenario import Scenario, Start, Terminal, Weights
 from multimodal_to.ocp.solution import Iterate, Solution, solve
@@ -8,7 +10,9 @@ from multimodal_to.ocp.solvers import Ipopt, Status
 __all__ = [
     "Ipopt",
     "Iterate",
+    "Miss",
     "Problem",
+    "Relaxation",
     "Scenario",
     "Solution",
     "Start",
@@ -16,5 +20,6 @@ __all__ = [
     "Terminal",
     "Weights",
     "build",
+    "relax",
     "solve",
 ]

@@ -59,6 +59,8 @@ class Rows:
     upper: float
     unit: str
     scale: float = 1.0
+    of: str = "robot"  # "robot", "joint", "contact" or "jet": what the rows are repeated for
+    components: tuple[str, ...] = ()  # the name of each row among them, as `stages` gives it
 
 
 ON_GROUND = 1e-5
@@ -68,8 +70,8 @@ KnotRows = Callable[[Knot, World], Rows]
 IntervalRows = Callable[[Knot, Knot, SX, World], Rows]
 
 
-def _equal(expression: SX, unit: str, scale: float = 1.0) -> Rows:
-    return Rows(expression=expression, lower=0.0, upper=0.0, unit=unit, scale=scale)
+def _equal(expression: SX, unit: str, scale: float = 1.0, of: str = "robot") -> Rows:
+    return Rows(expression=expression, lower=0.0, upper=0.0, unit=unit, scale=scale, of=of)
 
 
 # -------------------------------------------------------------------- at a knot
@@ -100,14 +102,14 @@ def angular_momentum_kinematics(knot: Knot, world: World) -> Rows:
 def contact_kinematics(knot: Knot, world: World) -> Rows:
     """p_i = fk_i(q) (eq. 17)."""
     positions = [knot.pose(name).translation for name in world.robot.contact_names]
-    return _equal(knot.contact_positions - cs.vertcat(*positions), "m")
+    return _equal(knot.contact_positions - cs.vertcat(*positions), "m", of="contact")
 
 
 def non_penetration(knot: Knot, world: World) -> Rows:
     """d(p_i) ≥ 0 (eq. 18)."""
     return Rows(
         expression=cs.vertcat(*(world.surface.distance(point) for point in knot.points)),
-        lower=0.0, upper=np.inf, unit="m",
+        lower=0.0, upper=np.inf, unit="m", of="contact",
     )  # fmt: skip
 
 
@@ -118,7 +120,7 @@ def friction_cone(knot: Knot, world: World) -> Rows:
         inside(world.surface, point, force, world.friction)
         for point, force in zip(knot.points, knot.forces, strict=True)
     ]
-    return Rows(expression=cs.vertcat(*faces), lower=0.0, upper=np.inf, unit="N", scale=50.0)
+    return Rows(expression=cs.vertcat(*faces), lower=0.0, upper=np.inf, unit="N", scale=50.0, of="contact")
 
 
 def complementarity(knot: Knot, world: World) -> Rows:
@@ -127,19 +129,21 @@ def complementarity(knot: Knot, world: World) -> Rows:
         contact.complementarity(world.surface, point, force)
         for point, force in zip(knot.points, knot.forces, strict=True)
     ]
-    return Rows(expression=cs.vertcat(*products), lower=-np.inf, upper=world.complementarity_max, unit="N m")
+    return Rows(
+        expression=cs.vertcat(*products), lower=-np.inf, upper=world.complementarity_max, unit="N m", of="contact"
+    )
 
 
 def contact_reach(knot: Knot, world: World) -> Rows:
     """|p_i − x| within CONTACT_REACH, by axis, as a fraction of it."""
     arms = [(point - knot.com_position) / cs.DM(CONTACT_REACH) for point in knot.points]
-    return Rows(expression=cs.vertcat(*arms), lower=-1.0, upper=1.0, unit="1")
+    return Rows(expression=cs.vertcat(*arms), lower=-1.0, upper=1.0, unit="1", of="contact")
 
 
 def jet_reach(knot: Knot, world: World) -> Rows:
     """|p_j − x| within JET_REACH, by axis, as a fraction of it (with p_j = fk_j(q), eq. 22)."""
     arms = [(knot.pose(jet.frame).translation - knot.com_position) / cs.DM(JET_REACH) for jet in world.robot.jets]
-    return Rows(expression=cs.vertcat(cs.SX(0, 1), *arms), lower=-1.0, upper=1.0, unit="1")
+    return Rows(expression=cs.vertcat(cs.SX(0, 1), *arms), lower=-1.0, upper=1.0, unit="1", of="jet")
 
 
 def static_equilibrium(knot: Knot, world: World) -> Rows:
@@ -150,7 +154,7 @@ def static_equilibrium(knot: Knot, world: World) -> Rows:
 
 def steady_thrust(knot: Knot, world: World) -> Rows:
     """0 = f(T, 0) + g(T, 0, u): the throttle holds the thrust; no rate is left at knot 0 (eq. 23)."""
-    return _equal(_thrust_acceleration(knot, world), "N/s²", scale=50.0)
+    return _equal(_thrust_acceleration(knot, world), "N/s²", scale=50.0, of="jet")
 
 
 def unit_quaternion(knot: Knot, world: World) -> Rows:
@@ -161,7 +165,7 @@ def unit_quaternion(knot: Knot, world: World) -> Rows:
 def standing_height(knot: Knot, world: World) -> Rows:
     """0 ≤ d(p_i) ≤ ON_GROUND: every contact point stands."""
     rows = non_penetration(knot, world)
-    return Rows(expression=rows.expression, lower=0.0, upper=ON_GROUND, unit="m")
+    return Rows(expression=rows.expression, lower=0.0, upper=ON_GROUND, unit="m", of="contact")
 
 
 # -------------------------------------------------------------------- over an interval
@@ -198,17 +202,19 @@ def base_orientation_integration(start: Knot, end: Knot, dt: SX, world: World) -
 
 def joint_integration(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
     """s⁺ = s + ṡ⁺ Δt (eq. 25c)."""
-    return _equal(gap(start.joint_positions, end.joint_positions, end.joint_velocities, dt), "rad")
+    return _equal(gap(start.joint_positions, end.joint_positions, end.joint_velocities, dt), "rad", of="joint")
 
 
 def thrust_integration(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
     """T⁺ = T + Ṫ⁺ Δt (eq. 26a)."""
-    return _equal(gap(start.thrust, end.thrust, end.thrust_rate, dt), "N", scale=50.0)
+    return _equal(gap(start.thrust, end.thrust, end.thrust_rate, dt), "N", scale=50.0, of="jet")
 
 
 def thrust_dynamics(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
     """Ṫ⁺ = Ṫ + (f(T⁺, Ṫ⁺) + g(T⁺, Ṫ⁺, u⁺)) Δt (eq. 23, 26b)."""
-    return _equal(gap(start.thrust_rate, end.thrust_rate, _thrust_acceleration(end, world), dt), "N/s", scale=50.0)
+    return _equal(
+        gap(start.thrust_rate, end.thrust_rate, _thrust_acceleration(end, world), dt), "N/s", scale=50.0, of="jet"
+    )
 
 
 def sliding(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
@@ -220,7 +226,9 @@ def sliding(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
         contact.sliding(world.surface, after, force, after - before)
         for before, after, force in zip(start.points, end.points, end.forces, strict=True)
     ]
-    return Rows(expression=cs.vertcat(*products), lower=-world.sliding_max, upper=world.sliding_max, unit="N m")
+    return Rows(
+        expression=cs.vertcat(*products), lower=-world.sliding_max, upper=world.sliding_max, unit="N m", of="contact"
+    )
 
 
 def _thrust_acceleration(knot: Knot, world: World) -> SX:

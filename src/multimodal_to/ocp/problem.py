@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as cs
 import numpy as np
@@ -30,7 +30,18 @@ class RowSet:
 
     unit: str
     index: NDArray[np.int64]  # into g
+    knots: NDArray[np.int64]  # that each is of; for rows over an interval its end
+    components: NDArray[np.str_]  # which of the rows of that name at a knot, as `contact 1 z`
     scale: float  # own unit per solver unit
+
+    def joined(self, other: RowSet) -> RowSet:
+        """Return these rows and others of the same name."""
+        return replace(
+            self,
+            index=np.concatenate([self.index, other.index]),
+            knots=np.concatenate([self.knots, other.knots]),
+            components=np.concatenate([self.components, other.components]),
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,8 +90,8 @@ class Problem:
 
     def scaled_violation(self, x: Array, g: Array) -> float:
         """Return the largest violation of all rows g = g(x) and bounds, in solver units."""
-        missed = _missed(g, self.row_lower, self.row_upper).max(initial=0.0)
-        return float(max(missed, _missed(x, self.lower, self.upper).max(initial=0.0)))
+        rows = missed(g, self.row_lower, self.row_upper).max(initial=0.0)
+        return float(max(rows, missed(x, self.lower, self.upper).max(initial=0.0)))
 
     def largest_violations(self, x: Array, g: Array | None = None) -> dict[str, float]:
         """Return by how much each set of rows, and each variable's bounds, are missed at x, in their own units.
@@ -89,9 +100,9 @@ class Problem:
             x: all variables, in solver units.
             g: the rows at x where they are known already.
         """
-        missed = _missed(self.rows_at(x) if g is None else g, self.row_lower, self.row_upper)
-        report = {name: float(missed[rows.index].max() * rows.scale) for name, rows in self.rows.items()}
-        outside = _missed(x, self.lower, self.upper) * self.scale
+        amounts = missed(self.rows_at(x) if g is None else g, self.row_lower, self.row_upper)
+        report = {name: float(amounts[rows.index].max() * rows.scale) for name, rows in self.rows.items()}
+        outside = missed(x, self.lower, self.upper) * self.scale
         for name, values in self.layout.read_horizon(outside).items():
             report[f"bounds of {name}"] = float(values.max(initial=0.0))
         report["bounds of interval"] = float(outside[-1])
@@ -171,7 +182,7 @@ def formulate(robot: Robot, scenario: Scenario, standing: Posture) -> tuple[Layo
     return layout, bounds, stages
 
 
-def _missed(values: Array, lower: Array, upper: Array) -> Array:
+def missed(values: Array, lower: Array, upper: Array) -> Array:
     """Return by how much values are below or above their limits, else zero; what is not a number stays none."""
     return np.maximum(np.maximum(lower - values, values - upper), 0.0)
 
@@ -196,8 +207,11 @@ def _row_bounds(stages: Sequence[NamedStage]) -> tuple[Array, Array, dict[str, R
             here = slice(offset, offset + count)
             lower[here], upper[here] = rows.lower / rows.scale, rows.upper / rows.scale
             index = (first + np.arange(offset, offset + count)[:, None] + height * np.arange(repeats)).ravel()
-            before = sets[name].index if name in sets else np.zeros(0, dtype=np.int64)
-            sets[name] = RowSet(unit=rows.unit, index=np.concatenate([before, index]), scale=rows.scale)
+            here_too = RowSet(
+                unit=rows.unit, index=index, knots=np.tile(named.knots, count),
+                components=np.repeat(np.array(rows.components, dtype=np.str_), repeats), scale=rows.scale,
+            )  # fmt: skip
+            sets[name] = sets[name].joined(here_too) if name in sets else here_too
             offset += count
         low.append(np.tile(lower, repeats))
         high.append(np.tile(upper, repeats))

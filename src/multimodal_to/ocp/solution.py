@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from multimodal_to import machine
 from multimodal_to.errors import SolverError
-from multimodal_to.ocp.best import Best, Checkpoint
+from multimodal_to.ocp.best import FEASIBLE, Best, Checkpoint
 from multimodal_to.ocp.interrupts import Interrupts
+from multimodal_to.ocp.misses import Miss, misses
 from multimodal_to.ocp.motion import motion
 from multimodal_to.ocp.problem import Problem
 from multimodal_to.ocp.record import Kind, to_json
@@ -53,8 +54,9 @@ class Solution:
     violations: dict[str, float]  # largest by name, recomputed from the problem, in their own units
     units: dict[str, str] = field(repr=False)  # of the violations
     iterations: int
-    iteration: int  # that the trajectory is from
+    iteration: int  # that the trajectory is from, as `progress` counts; a restoration shows some of IPOPT's twice
     feasible: bool
+    misses: tuple[Miss, ...] = field(repr=False)  # families of rows and bounds that are not met, the worst first
     solve_time: float  # wall time in the solver [s]
     statistics: dict[str, Any] = field(repr=False)  # the solver's own, `threads` and `versions`
 
@@ -133,6 +135,7 @@ def solve(
     )  # fmt: skip
     return Solution(
         status=status, solver_message=message, trajectory=motion(problem, end.x, solve_json), **facts,
+        misses=misses(problem, end.x, FEASIBLE),
         units={name: problem.unit(name) for name in violations}, statistics=statistics | environment,
     )  # fmt: skip
 
@@ -261,5 +264,5 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
             return self._problem.rows_at(x)
         first: Array = g[: self._problem.row_lower.size].full().ravel()
         if self._rows_first is None:
-            self._rows_first = np.array_equal(first, self._problem.rows_at(x))
+            self._rows_first = np.allclose(first, self._problem.rows_at(x), rtol=0.0, atol=1e-9)
         return first if self._rows_first else self._problem.rows_at(x)

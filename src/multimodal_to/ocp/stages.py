@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as cs
 import numpy as np
@@ -14,6 +15,7 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.ocp import constraints, costs
 from multimodal_to.ocp.boundary import END_ROWS, START_ROWS
 from multimodal_to.ocp.constraints import IntervalRows, KnotRows, Rows, World
+from multimodal_to.ocp.naming import components
 from multimodal_to.ocp.scenario import Scenario, Weights
 from multimodal_to.ocp.transcription import Stage
 from multimodal_to.ocp.variables import INTERVAL_SCALE, Bounds, Knot, Layout
@@ -51,6 +53,7 @@ class NamedStage:
 
     stage: Stage
     rows: list[tuple[str, Rows]]
+    knots: NDArray[np.int64]  # that the rows are of; for those over an interval its end
     cost_names: tuple[str, ...]
 
 
@@ -83,6 +86,7 @@ def collect(world: World, scenario: Scenario, layout: Layout, bounds: Bounds) ->
                 costs=cs.vertcat(cs.SX(0, 1), *charged[name].values()),
             ),
             rows=rows[name],
+            knots=starts if name == "first" else starts + 1,
             cost_names=tuple(charged[name]),
         )
         for name, starts in {"first": first, "every": every, "last": last}.items()
@@ -90,10 +94,15 @@ def collect(world: World, scenario: Scenario, layout: Layout, bounds: Bounds) ->
     ]
 
 
-def _named(functions: Sequence[Callable[..., Rows]], *arguments: object) -> list[tuple[str, Rows]]:
+def _named(functions: Sequence[Callable[..., Rows]], *arguments: Any) -> list[tuple[str, Rows]]:
     """Return the rows of each function with its name; a robot without jets has none of theirs."""
     rows = [(function.__name__, function(*arguments)) for function in functions]
-    return [(name, some) for name, some in rows if some.expression.shape[0]]
+    robot = arguments[-1].robot  # of the world
+    return [
+        (name, replace(some, components=components(robot, some.of, some.expression.shape[0])))
+        for name, some in rows
+        if some.expression.shape[0]
+    ]
 
 
 def _move_to_bounds(
@@ -102,18 +111,19 @@ def _move_to_bounds(
     """Turn rows that are a single variable, up to a constant, into its bounds at `knots`; return the others."""
     left = []
     for label, rows in named:
-        jacobian, kept = cs.sparsify(cs.jacobian(rows.expression, z)), [cs.SX(0, 1)]
+        jacobian, kept, names = cs.sparsify(cs.jacobian(rows.expression, z)), [cs.SX(0, 1)], list[str]()
         for index in range(rows.expression.shape[0]):
             entry, row = rows.expression[index], jacobian[index, :]
             if row.nnz() != 1 or not row.nonzeros()[0].is_constant():
                 kept.append(entry)
+                names.append(rows.components[index])
                 continue
             slope = float(row.nonzeros()[0])
             constant = float(cs.substitute(entry, z, cs.DM.zeros(z.shape[0])))
             low, high = sorted((limit - constant) / slope for limit in (rows.lower, rows.upper))
             _tighten(bounds, layout, row.sparsity().get_col()[0], low, high, knots)
         if sum(entry.shape[0] for entry in kept):
-            left.append((label, replace(rows, expression=cs.vertcat(*kept))))
+            left.append((label, replace(rows, expression=cs.vertcat(*kept), components=tuple(names))))
     return left
 
 

@@ -1,0 +1,27 @@
+"""Names for the components of stacked quantities: joints, contact points, jets and axes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from multimodal_to.models.robot import Robot
+
+_AXES: Mapping[int, tuple[str, ...]] = MappingProxyType(
+    {
+        3: ("x", "y", "z"),
+        4: ("x", "y", "z", "w"),
+        6: ("linear x", "linear y", "linear z", "angular x", "angular y", "angular z"),
+    }
+)
+
+
+def components(robot: Robot, of: str, count: int) -> tuple[str, ...]:
+    """Return the names of `count` rows that are repeated for each "joint", "contact" or "jet", or once for the "robot".
+
+    Such as `l_knee`, or `l_sole_front_left z` where there are three rows for each.
+    """
+    bodies = {"robot": ("",), "joint": robot.joint_names, "contact": robot.contact_names, "jet": robot.jet_names}[of]
+    each = count // len(bodies) if bodies else 0
+    axes = _AXES.get(each, ("",) * each)
+    return tuple(" ".join(filter(None, (body, axis))) for body in bodies for axis in axes)
