@@ -21,7 +21,7 @@ from pathlib import Path
 
 import multimodal_to as mt
 
-SHORT = ("knots=20", "interval_min=0.175", "interval_max=0.35")
+TASK = ("take-off", "--set", "knots=20", "--set", "interval_min=0.175", "--set", "interval_max=0.35")
 CTRL_C = b"\x03"
 AT_ONCE = 1.0  # greatest time from the second Ctrl-C to the end [s]
 
@@ -44,13 +44,12 @@ class End:
 class Terminal:
     """A solve of the command line as a person sees it."""
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
-        settings = [word for setting in SHORT for word in ("--set", setting)]
+    def __init__(self, folder: Path, *task: str) -> None:
         self._screen, self._keyboard = b"", -1
         self._keyboard, terminal = pty.openpty()
         self._terminal, self._before = terminal, termios.tcgetattr(terminal)
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "multimodal_to", "solve", *(arguments or ("take-off", *settings)), "-o", folder],
+            [sys.executable, "-m", "multimodal_to", "solve", *(task or TASK), "--output", folder],
             stdin=terminal, stdout=terminal, stderr=terminal, preexec_fn=_own_terminal,
         )  # fmt: skip
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -120,9 +119,9 @@ def feasible(folder: Path) -> bool:
     return record is not None and record["feasible"]
 
 
-def killed(folder: Path, delay: float) -> bool:
+def killed(folder: Path, delay: float, *task: str) -> bool:
     """Kill a solve some time after its first feasible iterate was written; return whether what is left loads."""
-    terminal = Terminal(folder)
+    terminal = Terminal(folder, *task)
     terminal.wait_for(lambda: feasible(folder))
     time.sleep(delay)
     terminal.kill()
@@ -135,12 +134,12 @@ def killed(folder: Path, delay: float) -> bool:
 def _loaded(folder: Path) -> tuple[mt.Robot, mt.Trajectory]:
     file = folder / "checkpoint.npz"
     trajectory = mt.Trajectory.load(file if file.is_file() else folder / "trajectory.npz")
-    return mt.load_robot(trajectory.robot), trajectory
+    return mt.load_robot(trajectory.robot).with_jets(trajectory.jet_names), trajectory
 
 
-def interrupted(folder: Path, delay: float, *, twice: bool) -> End:
+def interrupted(folder: Path, delay: float, *task: str, twice: bool) -> End:
     """Press Ctrl-C some time after the first iteration, once or twice."""
-    terminal = Terminal(folder)
+    terminal = Terminal(folder, *task)
     terminal.wait_for(lambda: terminal.says("iteration"))
     time.sleep(delay)
     terminal.press_ctrl_c()
