@@ -109,8 +109,38 @@ def test_a_solve_writes_trajectory_plot_and_replay_even_without_an_answer(stoppe
     assert result.returncode == 1
     assert result.stderr == ""
     assert "iteration limit: allow more iterations" in result.stdout
+    assert re.search(
+        r"^the trajectory is the best iterate, of iteration \d+: not feasible$", result.stdout, re.MULTILINE
+    )
+    assert re.search(r"^missed: \w+ at knot \d+, [\w ]+, by \S+ \S+ \(\d+ of \d+ rows\)$", result.stdout, re.MULTILINE)
     assert sorted(path.name for path in folder.iterdir()) == ["forces.png", "replay.html", "trajectory.npz"]
     assert Trajectory.load(folder / "trajectory.npz").scenario == "take-off"
+
+
+def test_a_task_that_contradicts_itself_is_explained_by_what_has_to_give_way(tmp_path):
+    jump = replace(scenarios.jump(), knots=10, interval_min=0.1, interval_max=0.1, mid_height_min=None, allowances={})
+    scenario_files.save(replace(jump, final_com=(0.0, 0.0, 0.70)), tmp_path / "too_high.toml")  # for these legs
+    result = run("solve", "too_high.toml", "--explain", "--max-iterations", 200, cwd=tmp_path)
+    assert result.returncode == 1
+    assert "explain: gives way: contact_reach at knot 10, " in result.stdout
+    assert "explain: gives way: com_kinematics at knot 10, z, by 0.09" in result.stdout
+
+
+def test_an_unfinished_solve_goes_on_with_its_own_values_alone(stopped):
+    unfinished = stopped[0] / "trajectory.npz"
+    for arguments in (("jump",), ("take-off", "--set", "knots=20"), ("--set", "final_com_height=0.8")):
+        result = run("solve", *arguments, "--resume", unfinished)
+        assert (result.returncode, result.stdout) == (2, "")
+        assert "is of 'take-off' with other values than asked for; --resume goes on with its own" in result.stderr
+    result = run("solve", "--resume", unfinished, "--warm-start", unfinished)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert "--resume and --warm-start both say what to start from" in result.stderr
+
+
+def test_a_bare_motion_is_nothing_to_go_on_with(file):
+    result = run("solve", "--resume", file)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert "keeps no scenario to go on with; name one and start from it by --warm-start" in result.stderr
 
 
 def test_progress_names_iteration_objective_violation_and_time(stopped):
@@ -187,6 +217,8 @@ def test_bare_arrays_are_audited_once_their_robot_is_named(file, tmp_path):
         (("solve", "take-off", "--set", "knots=few"), "'knots' is 'few'; expected a whole number"),
         (("reproduce", "takeoff"), "unknown scenario 'takeoff'; did you mean 'take-off'?"),
         (("reproduce", "jump", "--published", "none"), "no .npz of a published trajectory in 'none'"),
+        (("solve",), "nothing to solve; expected the NAME of a scenario, or --resume FILE"),
+        (("solve", "--resume", "none.npz"), "no trajectory file 'none.npz'"),
         (("solve", "none.toml"), "cannot read 'none.toml'"),
         (("solve", "take-off", "--robot", "ironcup"), "unknown robot 'ironcup'; did you mean 'ironcub'?"),
         (("solve", "take-off", "--max-iterations", "0"), "max_iterations is 0; expected a positive number"),

@@ -242,3 +242,33 @@ def test_ctrl_c_leaves_terminal_and_files_whole(task, tmp_path, twice):
         assert end.status == 1
         assert [path.name for path in tmp_path.iterdir()] == ["trajectory.npz"]
         assert mt.Trajectory.load(tmp_path / "trajectory.npz").solve_record()["status"] == "stopped"
+
+
+@pytest.mark.parametrize(("violation", "status"), [(1e-6, mt.Status.ACCEPTABLE), (1e8, mt.Status.FAILED)])
+def test_acceptable_is_never_called_optimal_nor_anything_that_misses_rows_acceptable(
+    problem, monkeypatch, violation, status
+):
+    """The solver is made to stop where it finds itself acceptable, long before the optimality conditions hold."""
+    loose = dict.fromkeys(("acceptable_tol", "acceptable_dual_inf_tol", "acceptable_compl_inf_tol"), 1e8)
+    loose |= {"acceptable_iter": 1, "acceptable_obj_change_tol": 1e20, "acceptable_constr_viol_tol": violation}
+    options = mt.Ipopt.options
+    monkeypatch.setattr(mt.Ipopt, "options", lambda *arguments: options(*arguments) | loose)
+    ended = mt.solve(problem)
+    assert ended.solver_message == "Solved_To_Acceptable_Level"
+    assert ended.status is status
+    assert ended.trajectory.solve_record()["status"] == status.value
+
+
+def test_only_one_word_of_the_solver_means_optimal():
+    words = (
+        "Solve_Succeeded", "Solved_To_Acceptable_Level", "Infeasible_Problem_Detected",
+        "Search_Direction_Becomes_Too_Small",
+        "Diverging_Iterates", "User_Requested_Stop", "Feasible_Point_Found", "Maximum_Iterations_Exceeded",
+        "Restoration_Failed", "Error_In_Step_Computation", "Maximum_CpuTime_Exceeded", "Maximum_WallTime_Exceeded",
+        "Not_Enough_Degrees_Of_Freedom", "Invalid_Problem_Definition", "Invalid_Option", "Invalid_Number_Detected",
+        "Unrecoverable_Exception", "NonIpopt_Exception_Thrown", "Insufficient_Memory", "Internal_Error", "",
+    )  # fmt: skip
+    assert [word for word in words if mt.Ipopt.status(word) is mt.Status.OPTIMAL] == ["Solve_Succeeded"]
+    assert [word for word in words if mt.Ipopt.status(word).solved] == [
+        "Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found",
+    ]  # fmt: skip

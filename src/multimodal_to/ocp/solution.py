@@ -124,6 +124,8 @@ def solve(
         if status in (Status.TIME_LIMIT, Status.STOPPED) or iterations >= solver.max_iterations:
             break
     end = best.end(x, iterations, phase, answer=status.solved)
+    if status.solved and end.violation > max(FEASIBLE, solver.violation_tolerance):  # whatever the solver says
+        status, end = Status.FAILED, best.end(x, iterations, phase, answer=False)
     violations, costs = problem.largest_violations(end.x), problem.costs(end.x)
     facts: dict[str, Any] = {
         "iterations": iterations, "iteration": end.iteration, "feasible": end.feasible,

@@ -37,7 +37,7 @@ _ADVICE = {
     Status.ACCEPTABLE: "the constraints hold, optimality only loosely; look at the violations before use",
     Status.ITERATION_LIMIT: "allow more iterations, or check that the violations still fall",
     Status.TIME_LIMIT: "allow more time, or check that the violations still fall",
-    Status.STOPPED: "stopped on request; the last iterate is no answer",
+    Status.STOPPED: "stopped on request; what was found by then is no answer, but a solve can go on from it",
     Status.INFEASIBLE: "the rows with the largest violation contradict each other; relax what they ask for",
     Status.FAILED: "the solver gave up; look at the largest violations and at the scenario's numbers",
 }
