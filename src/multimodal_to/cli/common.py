@@ -30,7 +30,8 @@ out = Console(highlight=False)
 File = Annotated[Path, typer.Argument(help="Trajectory file, as `solve` writes it.")]
 ScenarioName = Annotated[str, typer.Argument(help="Scenario, as `list` shows it, or a TOML file of one.")]
 OptionalName = Annotated[
-    str | None, typer.Argument(metavar="NAME", help="The same; not needed with --resume.", show_default=False)
+    str | None,
+    typer.Argument(metavar="NAME", help="Scenario, as `list` shows it, or a TOML file of one; needless with --resume."),
 ]
 Settings = Annotated[
     list[str] | None,

@@ -19,7 +19,7 @@ _AXES: Mapping[int, tuple[str, ...]] = MappingProxyType(
 def components(robot: Robot, of: str, count: int) -> tuple[str, ...]:
     """Return the names of `count` rows that are repeated for each "joint", "contact" or "jet", or once for the "robot".
 
-    Such as `l_knee`, or `l_sole_front_left z` where there are three rows for each.
+    Such as `l_knee`, or `l_sole_1 z` where there are three rows for each.
     """
     bodies = {"robot": ("",), "joint": robot.joint_names, "contact": robot.contact_names, "jet": robot.jet_names}[of]
     each = count // len(bodies) if bodies else 0

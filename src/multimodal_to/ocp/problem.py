@@ -31,7 +31,7 @@ class RowSet:
     unit: str
     index: NDArray[np.int64]  # into g
     knots: NDArray[np.int64]  # that each is of; for rows over an interval its end
-    components: NDArray[np.str_]  # which of the rows of that name at a knot, as `contact 1 z`
+    components: NDArray[np.str_]  # which of the rows of that name at a knot, as `l_sole_1 z`
     scale: float  # own unit per solver unit
 
     def joined(self, other: RowSet) -> RowSet:
