@@ -120,7 +120,7 @@ def test_a_solve_writes_trajectory_plot_and_replay_even_without_an_answer(stoppe
 def test_a_task_that_contradicts_itself_is_explained_by_what_has_to_give_way(tmp_path):
     jump = replace(scenarios.jump(), knots=10, interval_min=0.1, interval_max=0.1, mid_height_min=None, allowances={})
     scenario_files.save(replace(jump, final_com=(0.0, 0.0, 0.70)), tmp_path / "too_high.toml")  # for these legs
-    result = run("solve", "too_high.toml", "--explain", "--max-iterations", 200, cwd=tmp_path)
+    result = run("solve", "too_high.toml", "--force", "--explain", "--max-iterations", 200, cwd=tmp_path)
     assert result.returncode == 1
     assert "explain: gives way: contact_reach at knot 10, " in result.stdout
     assert "explain: gives way: com_kinematics at knot 10, z, by 0.09" in result.stdout
