@@ -70,7 +70,7 @@ def test_a_robot_is_loaded_from_its_folder(folder, ironcub):
         ("friction = 0.33", "friction = 0.33\nmu = 1", "unknown key 'mu'"),
         ("home = 0.379599880", "home = 3.0", "home 3.0 is not within its range"),
         ("0.999940330]", "0.5]", "has the norm"),
-        ('urdf = "ironcub.urdf"', 'urdf = "other.urdf"', "cannot read the URDF"),
+        ('urdf = "ironcub.urdf"', 'urdf = "other.urdf"', "other.urdf': No such file"),
         ('urdf = "ironcub.urdf"', 'urdf = "../../ironcub.urdf"', "outside the robot's folder"),
         ("thrust_max = 160.0", "thrust_max = -5", "expected a positive thrust_max"),
         ("[joints]", "[joints", "not valid TOML"),

@@ -130,7 +130,7 @@ def solve(
     scenario = chosen(name, settings)
     solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit)
     start = None if warm_start is None else Trajectory.load(warm_start)
-    console = Console(highlight=False, quiet=quiet)
+    console = Console(highlight=False, markup=False, emoji=False, quiet=quiet)
     the_robot = load_robot(robot)
     _refuse_hopeless(examine(the_robot, scenario), console, force)
     folder = writable(output or Path("results") / scenario.name)
