@@ -59,7 +59,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
 
 _LABELS = ("joint_names", "contact_names", "jet_names")
 
-LARGEST_ARCHIVE = 64_000_000
+LARGEST_ARCHIVE = 32_000_000
 """The largest `.npz` that is read [byte] ..."""
 LARGEST_CONTENT = 256_000_000
 """... and the most that its arrays may take in memory [byte]; ten thousand knots of a humanoid take a twentieth."""

@@ -21,11 +21,14 @@ from multimodal_to.reading import read_bytes
 
 LARGEST_URDF = 10_000_000
 """The largest URDF that is read [byte]."""
+MOST_ELEMENTS = 50_000
+"""The most XML elements of a URDF; a humanoid with all its visuals has a tenth."""
 MOST_LINKS = 1_000
-"""The most links of a robot: each takes some milliseconds before anything is computed with it."""
+"""The most links of a robot, and the most joints: each takes some milliseconds before anything is computed with it."""
 LARGEST_NUMBER = 1e9
 """No length [m], angle [rad], mass [kg] or inertia [kg m²] is larger; limits of joints may be."""
 
+_ENTITIES = "declares a document type, whose entities are not read; write out what they stand for"
 _MOVING = ("revolute", "continuous", "prismatic")
 _SUPPORTED = (*_MOVING, "fixed")
 _NO_DIRECTION = 1e-6
@@ -70,8 +73,8 @@ def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
     not given twice; whether the joints form a tree, `load_tree` says.
 
     Raises:
-        ModelError: the file is missing, larger than `LARGEST_URDF`, no URDF, or breaks off, or has no links or more
-            than `MOST_LINKS`.
+        ModelError: the file is missing, larger than `LARGEST_URDF` or no URDF, or it has no links, or more than
+            `MOST_LINKS` or `MOST_ELEMENTS`.
     """
     text, source = _read(urdf)
     try:
@@ -80,11 +83,15 @@ def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
             resolve_entities=False, load_dtd=False, no_network=True, remove_comments=True, remove_pis=True,
         ))  # fmt: skip
     except (etree.XMLSyntaxError, ValueError) as error:
+        if b"<!DOCTYPE" in text:  # whose entities the parser has stumbled over
+            raise ModelError(f"{source} {_ENTITIES}") from error
         raise ModelError(f"{source} is not valid XML: {error}") from error
     if root.getroottree().docinfo.internalDTD is not None:
-        raise ModelError(f"{source} declares a document type; entities are not read")
+        raise ModelError(f"{source} {_ENTITIES}")
     if root.tag != "robot":
         raise ModelError(f"{source} is no URDF: its root element is <{root.tag}>, expected <robot>")
+    if (count := sum(1 for _ in root.iter())) > MOST_ELEMENTS:
+        raise ModelError(f"{source} has {count} elements; at most {MOST_ELEMENTS} are read")
     if root.get("name") is None:
         root.set("name", "robot")
     _keep_what_is_used(root)
@@ -137,14 +144,14 @@ def _keep_what_is_used(root: Any) -> None:
 
 
 def _check_names(root: Any, source: str) -> None:
-    """Refuse a URDF of no link, of too many, or of two with one name."""
-    links = len(root.findall("link"))
-    if not links:
-        raise ModelError(f"{source} holds no links")
-    if links > MOST_LINKS:
-        raise ModelError(f"{source} has {links} links; at most {MOST_LINKS} are read")
+    """Refuse a URDF of no link, of too many links or joints, or of two with one name."""
     for kind in ("link", "joint"):
-        counts = Counter(element.get("name") for element in root.iterfind(kind))
+        names = [element.get("name") for element in root.iterfind(kind)]
+        if kind == "link" and not names:
+            raise ModelError(f"{source} holds no links")
+        if len(names) > MOST_LINKS:
+            raise ModelError(f"{source} has {len(names)} {kind}s; at most {MOST_LINKS} are read")
+        counts = Counter(names)
         if repeated := [name for name, count in counts.items() if count > 1 and name]:
             raise ModelError(f"{source} has more than one {kind} named {listed(repeated)}")
 
