@@ -117,7 +117,7 @@ def _surface(table: Any, where: str, base: Surface | None) -> Surface:
     names = {kind: name for name, kind in SURFACES.items()}
     own = names.get(type(base))  # type: ignore[arg-type]
     name = table.get("kind", own)
-    if name not in SURFACES:
+    if not isinstance(name, str) or name not in SURFACES:
         raise _wrong(f"{where}.kind", name, f"one of {', '.join(SURFACES)}")
     rest = {key: value for key, value in table.items() if key != "kind"}
     try:
