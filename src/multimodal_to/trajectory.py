@@ -20,6 +20,9 @@ from multimodal_to.writing import whole
 FORMAT_VERSION = 2
 """Version 1 lacks `scenario_json`; it is read all the same."""
 
+_NO_ROTATION = 1e-6
+"""A quaternion all of whose parts are smaller cannot be made a unit one."""
+
 Array = NDArray[np.float64]
 
 
@@ -63,6 +66,8 @@ LARGEST_ARCHIVE = 32_000_000
 """The largest `.npz` that is read [byte] ..."""
 LARGEST_CONTENT = 256_000_000
 """... and the most that its arrays may take in memory [byte]; ten thousand knots of a humanoid take a twentieth."""
+LARGEST_VALUE = 1e15
+"""The largest number that is read: squares and products of larger ones leave what a float holds."""
 MOST_ARRAYS = 1_000
 """The most arrays of an archive."""
 
@@ -76,7 +81,7 @@ class Trajectory:
 
     Raises:
         TrajectoryError: an array has the wrong shape or is not finite, time does not increase, a name stands twice, or
-            a quaternion is zero.
+            a quaternion is next to zero.
     """
 
     robot: str
@@ -123,8 +128,8 @@ class Trajectory:
         for label in _LABELS:
             if len(set(names := getattr(self, label))) < len(names):
                 raise TrajectoryError(f"'{label}' are {listed(names)}; expected each name once")
-        if not self.base_quaternion_xyzw.any(axis=0).all():
-            raise TrajectoryError("'base_quaternion_xyzw' holds a quaternion of zeros, which is no rotation")
+        if np.abs(self.base_quaternion_xyzw).max(axis=0).min() < _NO_ROTATION:
+            raise TrajectoryError("'base_quaternion_xyzw' holds a quaternion next to zero, which is no rotation")
 
     @property
     def knots(self) -> int:
@@ -266,13 +271,16 @@ def numbers(stored: Mapping[str, np.ndarray], name: str, source: Path) -> Array:
     """Return an array of an archive as floats.
 
     Raises:
-        TrajectoryError: the array is not numeric.
+        TrajectoryError: the array is not numeric, or a number is larger than `LARGEST_VALUE`.
     """
     array = stored[name]
     if array.dtype.kind not in "fiu":
         raise TrajectoryError(f"'{source}': '{name}' is not numeric")
-    with np.errstate(over="ignore"):  # what a float cannot hold becomes infinite, which is refused later
-        return array.astype(float)
+    with np.errstate(over="ignore"):  # what a float cannot hold becomes infinite
+        array = array.astype(float)
+    if (np.abs(array) > LARGEST_VALUE).any():
+        raise TrajectoryError(f"'{source}': '{name}' holds values larger than {LARGEST_VALUE:g}")
+    return array
 
 
 def _texts(stored: Mapping[str, np.ndarray], name: str, source: Path) -> tuple[str, ...]:
