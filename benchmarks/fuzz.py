@@ -47,7 +47,7 @@ from multimodal_to.replay.dress import read_dress
 from multimodal_to.replay.visuals import appearance
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 
-PATIENCE = 5.0  # [s] for one input
+PATIENCE = 10.0  # [s] for one input, of which none needs one
 MEMORY = 8 << 30  # address space of the process [byte], so that what is allotted without measure fails
 
 INERTIAL = (

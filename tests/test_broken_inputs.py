@@ -133,6 +133,7 @@ BROKEN = {
     "knots without end": toml(f"based_on = 'take-off'\nknots = {10**12}", "knots is 1000000000000", "3 to 10000"),
     "an unknown base": toml("based_on = 'takeoff'", "unknown scenario 'takeoff'", "did you mean 'take-off'?"),
     "a name that leads elsewhere": toml("based_on = 'take-off'\nname = '../../home'", "name is '../../home'"),
+    "a title that clears the screen": toml("based_on = 'take-off'\ntitle = \"\\u001b[2J\"", "control characters"),
     "an abyss of lists": toml(f"a = {'[' * 100_000}", "nested too deep"),
     "a key of a thousand parts": toml(f"{'a.' * 1000}a = 1", "a key has more than 32 parts"),
     "a TOML of 2 MB": toml("#" * 2_000_000, "larger than 1 MB"),
@@ -148,6 +149,8 @@ BROKEN = {
     "a robot's number beyond floats": robot("friction = 0.33", f"friction = {10**400}", "'friction'", "finite number"),
     "an unknown robot": Broken(
         command="solve take-off --robot ironcup --output out/new", error=ModelError, says=("did you mean 'ironcub'?",)),
+    "a robot of no name": Broken(
+        command=f"solve take-off --robot {'x' * 5000} -o out/new", error=ModelError, says=("unknown robot 'xxx",)),
     "a folder without a robot": Broken(
         command="solve take-off --robot . --output out/new", error=ModelError, says=("robot.toml", "No such file")),
     # URDFs
@@ -184,6 +187,7 @@ BROKEN = {
     "a time that stands": arrays("increase from knot to knot", time=np.zeros(21)),
     "a file of a later release": arrays("format version 99", "reads 1 to 2", format_version=np.array(99)),
     "a robot by its path": arrays("names its robot as the path '/tmp/evil'", "--robot", robot=np.array("/tmp/evil")),
+    "a robot above": arrays("names its robot as the path '..'", robot=np.array("..")),
     "another robot's joints": arrays(
         "is for another robot", "those of ironcub are torso_pitch", joint_names=np.array([f"j{i}" for i in range(23)])),
     "one joint twice": arrays("expected each name once", joint_names=np.array(["j"] * 23)),

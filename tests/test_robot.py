@@ -72,6 +72,8 @@ def test_a_robot_is_loaded_from_its_folder(folder, ironcub):
         ("0.999940330]", "0.5]", "has the norm"),
         ('urdf = "ironcub.urdf"', 'urdf = "other.urdf"', "other.urdf': No such file"),
         ('urdf = "ironcub.urdf"', 'urdf = "../../ironcub.urdf"', "outside the robot's folder"),
+        ('name = "right arm"', 'name = "left arm"', "jet given twice: left arm"),
+        ('"l_sole_2"', '"r_sole_1"', "contact point given twice: r_sole_1"),
         ("thrust_max = 160.0", "thrust_max = -5", "expected a positive thrust_max"),
         ("[joints]", "[joints", "not valid TOML"),
     ],

@@ -206,13 +206,9 @@ def read_archive(source: Path) -> dict[str, np.ndarray]:
     Raises:
         TrajectoryError: the file is missing, is no such archive, or is too large.
     """
-    try:
-        size = source.stat().st_size if source.is_file() else None
-    except OSError as error:
-        raise TrajectoryError(f"cannot read '{source}': {error.strerror}") from error
-    if size is None:
+    if not os.path.isfile(source):  # which takes names that no file can have, too
         raise TrajectoryError(f"no trajectory file '{source}'")
-    if size > LARGEST_ARCHIVE:
+    if (size := source.stat().st_size) > LARGEST_ARCHIVE:
         raise TrajectoryError(
             f"'{source}' has {size / 1e6:.0f} MB; trajectory files of at most {LARGEST_ARCHIVE / 1e6:.0f} MB are read"
         )

@@ -48,7 +48,7 @@ def loaded(file: Path, robot: str) -> tuple[Robot, Trajectory]:
         the_robot = load_robot(robot)
         return the_robot, import_arrays(the_robot, file)
     trajectory = Trajectory.load(file)
-    if not robot and Path(trajectory.robot).name != trajectory.robot:
+    if not robot and (Path(trajectory.robot).name != trajectory.robot or trajectory.robot in ("", "..")):
         raise TrajectoryError(
             f"'{file}' names its robot as the path '{trajectory.robot}', which is not followed; name the robot with "
             "--robot"

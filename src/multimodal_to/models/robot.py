@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam import KinDynComputations
-from multimodal_to.errors import ModelError, MultimodalError, unknown
+from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
 from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import Jet, JetModel
 from multimodal_to.reading import Table, read_toml
@@ -124,7 +125,7 @@ def load_robot(robot: str | os.PathLike[str]) -> Robot:
     """
     bundled = bundled_robots()
     folder = bundled.get(str(robot), Path(robot))
-    if not folder.is_dir():
+    if not os.path.isdir(folder):  # which takes names that no folder can have, too
         raise ModelError(f"{unknown('robot', str(robot), bundled)}; nor is there a folder of that name")
     path = folder / ROBOT_FILE
     table = read_toml(path, ModelError)
@@ -155,6 +156,8 @@ def _robot(table: Table, folder: Path) -> Robot:
     feet = contact.table("feet")
     contacts = tuple(ContactPoint(frame=frame, foot=foot) for foot in feet.names() for frame in feet.texts(foot))
     jets = _jets(table)
+    _refuse_repeated("contact point", [point.frame for point in contacts])
+    _refuse_repeated("jet", [jet.name for jet in jets])
     for frame in (*(point.frame for point in contacts), *(jet.frame for jet in jets)):
         kindyn.tree.frame(frame)
     quaternion = home.numbers("base_quaternion_xyzw", 4)
@@ -171,6 +174,11 @@ def _robot(table: Table, folder: Path) -> Robot:
         name=name, urdf=urdf, kindyn=kindyn, joint_groups=MappingProxyType(joint_groups), joint_limits=limits,
         contacts=contacts, friction=friction, jets=jets, home=posture,
     )  # fmt: skip
+
+
+def _refuse_repeated(kind: str, names: Sequence[str]) -> None:
+    if repeated := [name for name, count in Counter(names).items() if count > 1]:
+        raise ModelError(f"{kind} given twice: {listed(repeated)}")
 
 
 def _joints(joints: Table, names: Sequence[str], kindyn: KinDynComputations) -> tuple[JointLimits, Array]:

@@ -115,13 +115,16 @@ class Scenario:
         self._check_reach()
 
     def _check_name(self) -> None:
-        """Refuse a name that is no plain one: results go to a folder of that name, which must not lead elsewhere."""
+        """Refuse a name that is no plain one, since results go to a folder of that name, and titles no screen takes."""
         plain = self.name.isprintable() and not set(self.name) & set("/\\") and self.name.strip(". ")
         if not plain or len(self.name) > _LONGEST_NAME:
             raise ScenarioError(
                 f"name is {shown(self.name)}; expected one that a folder can have, of at most {_LONGEST_NAME} "
                 "characters and none of / and \\"
             )
+
+        if any(character < " " and character != "\n" for character in self.title):
+            raise ScenarioError(f"title is {shown(self.title)}; expected a text without control characters")
 
     def _check_numbers(self) -> None:
         if not 3 <= self.knots <= MOST_KNOTS:

@@ -96,16 +96,9 @@ def find_mesh(uri: str, urdf: Path) -> Path:
         plain = Path(os.path.normpath(candidate))
         if not plain.is_relative_to(os.path.normpath(root)):
             refused = True
-        elif _is_file(plain):
+        elif os.path.isfile(plain):  # which takes names that no file can have, too
             return plain
     raise _UnusableError("leaves the folder of its robot" if refused else "not found")
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # no name that a file can have
-        return False
 
 
 def _package_folders(name: str, urdf: Path) -> Iterator[Path]:
