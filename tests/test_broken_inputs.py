@@ -37,7 +37,7 @@ class Broken:
     """An input: the command that meets it, what it has to say, and how the input comes to be in a folder."""
 
     command: str
-    error: type[Exception] | None  # None: an option, which the parser of the command line refuses
+    error: type[Exception] | None  # None: the parser of options refuses it, or the doctor
     says: tuple[str, ...]
     make: Callable[[Path, Path], object] = lambda folder, good: None
 
@@ -46,7 +46,7 @@ def text(content: str) -> Callable[[Path, Path], object]:
     return lambda folder, good: (folder / "in").write_text(content, encoding="utf-8")
 
 
-def toml(content: str, *says: str, error: type[Exception] = ScenarioError) -> Broken:
+def toml(content: str, *says: str, error: type[Exception] | None = ScenarioError) -> Broken:
     """A scenario that is the take-off but for its content."""
     return Broken(command="solve in.toml --output out/new", error=error, says=says, make=lambda folder, good: (
         folder / "in.toml").write_text(content, encoding="utf-8"))  # fmt: skip
@@ -125,7 +125,7 @@ BROKEN = {
         "based_on = 'take-off'\nweights.trust = 1", "unknown key 'weights.trust'", "did you mean 'weights.thrust'?"),
     "an unknown joint group": toml(
         "based_on = 'take-off'\nweights.joint_velocities.leg = 1", "unknown joint group 'leg'", "did you mean 'legs'?",
-        error=ModelError),
+        error=None),
     "a text for a number": toml("based_on = 'take-off'\nknots = 'many'", "'knots' is 'many'", "a whole number"),
     "a NaN": toml("based_on = 'take-off'\nfinal_com = [0, 0, nan]", "'final_com[2]' is nan", "a finite number"),
     "a number beyond floats": toml(f"based_on = 'take-off'\nfriction = {10**400}", "'friction'", "a finite number"),
