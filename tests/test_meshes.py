@@ -11,13 +11,14 @@ import trimesh
 from adam_robots import example_robots
 from multimodal_to import replay
 from multimodal_to.adam import KinDynComputations
+from multimodal_to.adam.urdf import parse_urdf
 from multimodal_to.derived import frame_poses
 from multimodal_to.errors import MultimodalError
 from multimodal_to.models.robot import JointLimits, Posture, Robot
 from multimodal_to.replay import MeshWarning
 from multimodal_to.replay.dress import read_dress, zero_poses
 from multimodal_to.replay.meshes import Part, find_mesh, package_file, shaded
-from multimodal_to.replay.visuals import FACES, appearance, parse
+from multimodal_to.replay.visuals import FACES, appearance
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 
 IRONCUB = Path(__file__).parents[1] / "robots" / "ironcub"
@@ -110,7 +111,7 @@ def test_sharp_edges_stay_sharp_and_round_ones_round():
 @needs_icub
 def test_the_icubs_legs_hips_and_torso_coincide_with_the_ironcubs():
     dress = read_dress(IRONCUB)
-    ours, theirs = (zero_poses(parse(path), "root_link") for path in (IRONCUB / "ironcub.urdf", dress.urdf))
+    ours, theirs = (zero_poses(parse_urdf(path), "root_link") for path in (IRONCUB / "ironcub.urdf", dress.urdf))
     lower = [name for name in ours if name in theirs and any(part in name for part in ("hip", "leg", "ankle", "torso"))]
     assert len(lower) == 14
     for name in lower:
@@ -120,7 +121,7 @@ def test_the_icubs_legs_hips_and_torso_coincide_with_the_ironcubs():
 @needs_icub
 def test_each_mesh_meets_the_link_that_the_table_names():
     dress = read_dress(IRONCUB)
-    ours, other = parse(IRONCUB / "ironcub.urdf"), parse(dress.urdf)
+    ours, other = parse_urdf(IRONCUB / "ironcub.urdf"), parse_urdf(dress.urdf)
     mine, theirs = zero_poses(ours, "root_link"), zero_poses(other, "root_link")
     for garment, placement in zip(dress.garments, dress.placements(ours, other), strict=True):
         mesh = mine[garment.link] @ placement  # root_H_mesh

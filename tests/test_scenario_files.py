@@ -116,7 +116,7 @@ def test_another_kind_of_surface_starts_from_its_own_defaults_and_the_same_kind_
         (["surface.kind=plane", "surface.slope=inf"], "'surface.slope' is inf"),
         (["surface.kind=stairs", "surface.edges=[1]", "surface.heights=[1]"], "'surface': stairs have 1 edges"),
         (["surface=flat", "surface.height=1"], "another change gives 'surface' as a whole"),
-        (["knots=2"], "knots is 2; expected at least 3"),
+        (["knots=2"], "knots is 2; expected 3 to"),
         (["knots"], "'knots' is no change of a scenario; expected key=value"),
     ],
 )
@@ -148,7 +148,7 @@ def test_a_file_that_makes_no_scenario_is_refused_by_its_name(tmp_path, text, se
 def test_files_that_cannot_be_read_or_written_are_named(tmp_path, scenario):
     with pytest.raises(ScenarioError, match=r"cannot read '.*none.toml'"):
         scenario_files.load(tmp_path / "none.toml")
-    with pytest.raises(OutputError, match="cannot write the scenario to"):
+    with pytest.raises(OutputError, match="cannot write"):
         scenario_files.save(scenario, tmp_path / "missing" / "task.toml")
 
 

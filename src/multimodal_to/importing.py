@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.derived import contact_points
-from multimodal_to.errors import TrajectoryError
+from multimodal_to.errors import TrajectoryError, shown
 from multimodal_to.models.robot import Robot
-from multimodal_to.trajectory import QUANTITIES, Trajectory, read_archive
+from multimodal_to.trajectory import QUANTITIES, Trajectory, numbers, read_archive, refuse_missing
 
 COMPUTED = ("contact_positions",)
 """What bare arrays need not hold: it follows from the others."""
@@ -26,24 +26,33 @@ def import_arrays(robot: Robot, path: str | os.PathLike[str]) -> Trajectory:
     velocities at the first knot, which some files leave without meaning, are kept as they are.
 
     Raises:
-        TrajectoryError: the file is missing or broken, or lacks an array.
+        TrajectoryError: the file is missing, broken or too large, lacks an array, or holds one that fits no trajectory.
     """
     source = Path(path)
     stored = read_archive(source)
     wanted = [name for name in ("total_time", *QUANTITIES) if name not in COMPUTED]
-    if missing := [name for name in wanted if name not in stored]:
-        raise TrajectoryError(f"'{source}' lacks {', '.join(missing)}")
-    arrays: dict[str, Any] = {name: np.asarray(stored[name], dtype=float) for name in wanted}
-    count, contacts = arrays["com_position"].shape[-1], len(robot.contacts)
-    bare = Trajectory(
-        robot=robot.name,
-        scenario=source.stem.replace("_", "-"),
-        time=np.linspace(0.0, float(arrays.pop("total_time")), count),
-        joint_names=robot.joint_names,
-        contact_names=robot.contact_names,
-        jet_names=robot.jet_names,
-        contact_positions=np.zeros((3 * contacts, count)),
-        **arrays,
-    )
+    refuse_missing(stored, wanted, source)
+    arrays: dict[str, Any] = {name: numbers(stored, name, source) for name in wanted}
+    total_time = arrays.pop("total_time")
+    if total_time.size != 1 or not (np.isfinite(total_time).all() and total_time.item() > 0):
+        raise TrajectoryError(f"'{source}': 'total_time' is {shown(total_time.tolist())}; expected one positive number")
+    if arrays["com_position"].ndim != 2:
+        raise TrajectoryError(
+            f"'{source}': 'com_position' has shape {arrays['com_position'].shape}; expected (3, knots + 1)"
+        )
+    count, contacts = arrays["com_position"].shape[1], len(robot.contacts)
+    try:
+        bare = Trajectory(
+            robot=robot.name,
+            scenario=source.stem.replace("_", "-"),
+            time=np.linspace(0.0, total_time.item(), count),
+            joint_names=robot.joint_names,
+            contact_names=robot.contact_names,
+            jet_names=robot.jet_names,
+            contact_positions=np.zeros((3 * contacts, count)),
+            **arrays,
+        )
+    except TrajectoryError as error:
+        raise TrajectoryError(f"'{source}': {error}") from error
     points = contact_points(robot, bare)
     return replace(bare, contact_positions=points.transpose(0, 2, 1).reshape(-1, count))

@@ -7,18 +7,18 @@ only what differs from that bundled scenario.
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from multimodal_to.errors import MultimodalError, OutputError, ScenarioError
+from multimodal_to.errors import MultimodalError, ScenarioError, shortened, shown
 from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.ocp.scenario_data import from_dict, to_dict
-from multimodal_to.reading import read_toml
+from multimodal_to.reading import parse_toml, read_toml
 from multimodal_to.scenarios import find
+from multimodal_to.writing import write_text
 
 
 def load(path: str | os.PathLike[str]) -> Scenario:
@@ -39,7 +39,7 @@ def _scenario(table: dict[str, Any], name: str) -> Scenario:
     table = {"name": name, **table}
     parent = table.pop("based_on", None)
     if parent is not None and not isinstance(parent, str):
-        raise ScenarioError(f"'based_on' is {parent!r}; expected the name of a bundled scenario")
+        raise ScenarioError(f"'based_on' is {shown(parent)}; expected the name of a bundled scenario")
     return from_dict(table, find(parent) if parent is not None else None)
 
 
@@ -49,18 +49,13 @@ def to_toml(scenario: Scenario) -> str:
 
 
 def save(scenario: Scenario, path: str | os.PathLike[str]) -> Path:
-    """Write a scenario, complete, as a file that `load` reads.
+    """Write a scenario, complete, as a file that `load` reads; it appears whole or not at all.
 
     Raises:
         OutputError: the folder does not exist or cannot be written.
         ScenarioError: its surface is of a class that no file can name.
     """
-    target, text = Path(path), to_toml(scenario)
-    try:
-        target.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"cannot write the scenario to '{target}': {error.strerror or error}") from error
-    return target
+    return write_text(path, to_toml(scenario))
 
 
 def change(scenario: Scenario, settings: Iterable[str]) -> Scenario:
@@ -75,21 +70,23 @@ def change(scenario: Scenario, settings: Iterable[str]) -> Scenario:
     for setting in settings:
         key, equals, text = (part.strip() for part in setting.partition("="))
         if not (key and equals and text):
-            raise ScenarioError(f"'{setting}' is no change of a scenario; expected key=value")
+            raise ScenarioError(f"'{shortened(setting, 100)}' is no change of a scenario; expected key=value")
         *parents, last = key.split(".")
         place = table
         for parent in parents:
             place = place.setdefault(parent, {})
             if not isinstance(place, dict):
-                raise ScenarioError(f"'{setting}': another change gives '{parent}' as a whole")
+                raise ScenarioError(f"'{shortened(setting, 100)}': another change gives '{parent}' as a whole")
         place[last] = _value(text)
     return from_dict(table, scenario)
 
 
 def _value(text: str) -> Any:
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        table = parse_toml(f"value = {text}")
+        if len(table) == 1:  # no line break, and another key behind it
+            return table["value"]
+    except ValueError:
         pass
     try:
         return float(text)  # as a person writes it, .5 or 1.

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import os
-import tempfile
 import zipfile
-import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -16,10 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from multimodal_to.errors import OutputError, TrajectoryError
+from multimodal_to.errors import TrajectoryError, listed, shown
+from multimodal_to.writing import whole
 
 FORMAT_VERSION = 3
 """Version 1 lacks `scenario_json`, versions 1 and 2 lack `solve_json`; they are read all the same."""
+
+_NO_ROTATION = 1e-6
+"""A quaternion all of whose parts are smaller cannot be made a unit one."""
 
 Array = NDArray[np.float64]
 
@@ -60,6 +63,15 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
 
 _LABELS = ("joint_names", "contact_names", "jet_names")
 
+LARGEST_ARCHIVE = 32_000_000
+"""The largest `.npz` that is read [byte] ..."""
+LARGEST_CONTENT = 256_000_000
+"""... and the most that its arrays may take in memory [byte]; ten thousand knots of a humanoid take a twentieth."""
+LARGEST_VALUE = 1e15
+"""The largest number that is read: squares and products of larger ones leave what a float holds."""
+MOST_ARRAYS = 1_000
+"""The most arrays of an archive."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trajectory:
@@ -69,7 +81,8 @@ class Trajectory:
     axes; stacked quantities follow the order of `joint_names`, `contact_names` and `jet_names`.
 
     Raises:
-        TrajectoryError: an array is missing, has the wrong shape or is not finite, or time does not increase.
+        TrajectoryError: an array has the wrong shape or is not finite, time does not increase, a name stands twice, or
+            a quaternion is next to zero.
     """
 
     robot: str
@@ -114,6 +127,11 @@ class Trajectory:
                 raise TrajectoryError(f"'{name}' has shape {array.shape}; expected {expected}")
             if not np.isfinite(array).all():
                 raise TrajectoryError(f"'{name}' holds values that are not finite")
+        for label in _LABELS:
+            if len(set(names := getattr(self, label))) < len(names):
+                raise TrajectoryError(f"'{label}' are {listed(names)}; expected each name once")
+        if np.abs(self.base_quaternion_xyzw).max(axis=0).min() < _NO_ROTATION:
+            raise TrajectoryError("'base_quaternion_xyzw' holds a quaternion next to zero, which is no rotation")
 
     @property
     def knots(self) -> int:
@@ -154,7 +172,6 @@ class Trajectory:
         Raises:
             OutputError: the folder does not exist or cannot be written.
         """
-        target = Path(path)
         arrays: dict[str, Any] = {
             "format_version": np.array(FORMAT_VERSION),
             "robot": np.array(self.robot),
@@ -167,26 +184,17 @@ class Trajectory:
             **{name: np.array(getattr(self, name), dtype=np.str_) for name in _LABELS},
             **{name: getattr(self, name) for name in QUANTITIES},
         }
-        try:
-            with tempfile.NamedTemporaryFile(dir=target.parent, suffix=".npz", delete=False) as file:
-                try:
-                    np.savez_compressed(file, allow_pickle=False, **arrays)
-                    file.close()
-                    Path(file.name).chmod(0o644)
-                    Path(file.name).replace(target)
-                except BaseException:
-                    Path(file.name).unlink(missing_ok=True)
-                    raise
-        except OSError as error:
-            raise OutputError(f"cannot write the trajectory to '{target}': {error.strerror or error}") from error
-        return target
+        with whole(path) as draft, draft.open("wb") as stream:
+            np.savez_compressed(stream, allow_pickle=False, **arrays)
+        return Path(path)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Trajectory:
-        """Read a trajectory that `save` wrote.
+        """Read a trajectory that `save` wrote, of this format version or an older one.
 
         Raises:
-            TrajectoryError: the file is missing, is no such archive, or lacks a quantity.
+            TrajectoryError: the file is missing, is no such archive, is larger than `LARGEST_ARCHIVE` or
+                `LARGEST_CONTENT`, or what it holds is no trajectory.
         """
         source = Path(path)
         stored = read_archive(source)
@@ -195,31 +203,114 @@ class Trajectory:
             raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it has no format_version")
         if not 1 <= int(version) <= FORMAT_VERSION:
             raise TrajectoryError(f"'{source}' has format version {version}; this release reads 1 to {FORMAT_VERSION}")
-        wanted = ("robot", "scenario", "time", *_LABELS, *QUANTITIES)
-        if missing := [name for name in wanted if name not in stored]:
-            raise TrajectoryError(f"'{source}' lacks {', '.join(missing)}")
-        for name in ("time", *QUANTITIES):
-            if stored[name].dtype.kind not in "fiu":
-                raise TrajectoryError(f"'{source}': '{name}' is not numeric")
-        fields: dict[str, Any] = {"robot": str(stored["robot"]), "scenario": str(stored["scenario"])}
-        fields |= {name: str(stored.get(name, "")) for name in ("scenario_json", "solve_json")}
-        fields |= {name: tuple(str(label) for label in np.atleast_1d(stored[name])) for name in _LABELS}
-        fields |= {name: np.asarray(stored[name], dtype=float) for name in ("time", *QUANTITIES)}
-        return cls(**fields)
+        for name in ("scenario_json", "solve_json"):
+            stored.setdefault(name, np.array(""))
+        refuse_missing(stored, ("robot", "scenario", "time", *_LABELS, *QUANTITIES), source)
+        fields: dict[str, Any] = {name: numbers(stored, name, source) for name in ("time", *QUANTITIES)}
+        fields |= {name: _texts(stored, name, source) for name in _LABELS}
+        fields |= {name: _text(stored, name, source) for name in ("robot", "scenario", "scenario_json", "solve_json")}
+        try:
+            return cls(**fields)
+        except TrajectoryError as error:
+            raise TrajectoryError(f"'{source}': {error}") from error
 
 
 def read_archive(source: Path) -> dict[str, np.ndarray]:
-    """Return the arrays of an `.npz` archive by name; nothing that is pickled is read.
+    """Return the arrays of an `.npz` archive by name; nothing that is pickled is read, and nothing is too large.
+
+    What the archive says of its sizes is checked before anything is unpacked: that of each file in the directory of the
+    archive, which unpacking never exceeds, and that of each array against its file.
 
     Raises:
-        TrajectoryError: the file is missing or is no such archive.
+        TrajectoryError: the file is missing, is no such archive, or is too large.
     """
-    if not source.is_file():
+    if not os.path.isfile(source):  # which takes names that no file can have, too
         raise TrajectoryError(f"no trajectory file '{source}'")
+    if (size := source.stat().st_size) > LARGEST_ARCHIVE:
+        raise TrajectoryError(
+            f"'{source}' has {size / 1e6:.0f} MB; trajectory files of at most {LARGEST_ARCHIVE / 1e6:.0f} MB are read"
+        )
     if not zipfile.is_zipfile(source):
         raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it is no .npz archive")
     try:
-        with np.load(source, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        with zipfile.ZipFile(source) as archive:
+            _check_directory(archive, source)
+            return {member.filename.removesuffix(".npy"): _array(archive, member) for member in archive.infolist()}
+    except TrajectoryError:
+        raise
+    except Exception as error:  # a broken archive takes zipfile, its unpackers and numpy to a dozen kinds of errors
         raise TrajectoryError(f"'{source}' is not a trajectory file of this library: {error}") from error
+
+
+def _check_directory(archive: zipfile.ZipFile, source: Path) -> None:
+    members = archive.infolist()
+    if len(members) > MOST_ARRAYS:
+        raise TrajectoryError(f"'{source}' holds {len(members)} arrays; at most {MOST_ARRAYS} are read")
+    if (content := sum(member.file_size for member in members)) > LARGEST_CONTENT:
+        raise TrajectoryError(
+            f"'{source}' unpacks to {content / 1e6:.0f} MB; at most {LARGEST_CONTENT / 1e6:.0f} MB are read"
+        )
+    if len({member.filename for member in members}) < len(members):
+        raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it holds two arrays of one name")
+    for member in members:  # other ways of packing are not unpacked piece by piece, so that their size has no limit
+        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it is packed in another way")
+
+
+def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
+    """Return an array of an archive after a look at its head: numpy allots what that says before it reads on."""
+    with archive.open(member) as stream:
+        version = np.lib.format.read_magic(stream)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, kind = read(stream)
+        if kind.hasobject:
+            raise ValueError(f"'{member.filename}' holds pickled objects, which are not read")
+        if min(shape, default=1) < 0 or math.prod(shape) * kind.itemsize != member.file_size - stream.tell():
+            raise ValueError(f"'{member.filename}' has another size than its shape {shown(shape)} says")
+    with archive.open(member) as stream:
+        return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
+
+
+def refuse_missing(stored: Mapping[str, np.ndarray], wanted: Iterable[str], source: Path) -> None:
+    """Name what an archive lacks.
+
+    Raises:
+        TrajectoryError: it lacks something.
+    """
+    if missing := [name for name in wanted if name not in stored]:
+        raise TrajectoryError(f"'{source}' lacks {', '.join(missing)}")
+
+
+def numbers(stored: Mapping[str, np.ndarray], name: str, source: Path) -> Array:
+    """Return an array of an archive as floats.
+
+    Raises:
+        TrajectoryError: the array is not numeric, or a number is larger than `LARGEST_VALUE`.
+    """
+    array = stored[name]
+    if array.dtype.kind not in "fiu":
+        raise TrajectoryError(f"'{source}': '{name}' is not numeric")
+    with np.errstate(over="ignore"):  # what a float cannot hold becomes infinite
+        array = array.astype(float)
+    if (np.abs(array) > LARGEST_VALUE).any():
+        raise TrajectoryError(f"'{source}': '{name}' holds values larger than {LARGEST_VALUE:g}")
+    return array
+
+
+def _texts(stored: Mapping[str, np.ndarray], name: str, source: Path) -> tuple[str, ...]:
+    array = stored[name]
+    try:
+        if array.ndim > 1 or (array.size and array.dtype.kind != "U"):
+            raise ValueError
+        texts = tuple(str(text) for text in np.atleast_1d(array).tolist())
+        "".join(texts).encode("utf-8")  # no halves of characters
+    except ValueError as error:  # numpy's too, of codes that are no characters
+        raise TrajectoryError(f"'{source}': '{name}' is no text") from error
+    return texts
+
+
+def _text(stored: Mapping[str, np.ndarray], name: str, source: Path) -> str:
+    texts = _texts(stored, name, source)
+    if len(texts) != 1:
+        raise TrajectoryError(f"'{source}': '{name}' is no single text")
+    return texts[0]

@@ -19,6 +19,8 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
         OutputError: the folder does not exist or cannot be written.
     """
     target = Path(path)
+    if "\0" in str(target):
+        raise OutputError(f"cannot write '{target}': a path holds no null character")
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=target.suffix)
         os.close(handle)

@@ -24,8 +24,8 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import Inertia, rotation_from_rpy
-from multimodal_to.adam.tree import BASE, Body, Frame, Joint, Link, Tree
-from multimodal_to.errors import ModelError, unknown
+from multimodal_to.adam.tree import BASE, Body, Frame, Joint, Link, Mimic, Tree
+from multimodal_to.errors import ModelError, listed, unknown
 
 _SNAP = 1e-12
 """Entries of constant rotations and offsets closer than this to 0 or ±1 are taken as meant [1, m]."""
@@ -33,6 +33,8 @@ _PARALLEL = 1e-3
 """Axes whose angle has a smaller sine count as parallel: their common normal would be too far away."""
 _NOISE = 1e-16
 """First moments [kg m] and inertias [kg m²] smaller than this are rounding."""
+_FAR = 1e9
+"""No joint is held farther away than this [rad or m]."""
 _NEGATIVE = 1e-6
 """A principal inertia below zero by more than this part of the largest is no rounding."""
 
@@ -114,14 +116,14 @@ def build_tree(
 
 
 def _check_names(by_name: Mapping[str, Joint], moving: Sequence[str], locked: Mapping[str, float]) -> None:
-    movable = [name for name, joint in by_name.items() if joint.kind != "fixed"]
+    movable = {name: joint for name, joint in by_name.items() if joint.kind != "fixed"}
     for name in (*moving, *locked):
         if name not in movable:
             raise ModelError(unknown("joint", name, movable))
     if repeated := [name for name, count in Counter(moving).items() if count > 1]:
-        raise ModelError(f"joint given twice: {', '.join(repeated)}")
+        raise ModelError(f"joint given twice: {listed(repeated)}")
     if both := sorted(set(moving) & set(locked)):
-        raise ModelError(f"joint both moving and locked: {', '.join(both)}")
+        raise ModelError(f"joint both moving and locked: {listed(both)}")
 
 
 def _held(by_name: Mapping[str, Joint], moving: Sequence[str], locked: Mapping[str, float]) -> dict[str, float]:
@@ -136,22 +138,26 @@ def _held(by_name: Mapping[str, Joint], moving: Sequence[str], locked: Mapping[s
                 "move, or lock it"
             )
 
-    def value(name: str, followers: tuple[str, ...]) -> float:
-        if name in values or by_name[name].mimic is None:
-            return values.get(name, 0.0)
-        mimic = by_name[name].mimic
-        assert mimic is not None
-        if mimic.joint in followers or mimic.joint not in by_name:
-            raise ModelError(f"joint '{name}' mimics '{mimic.joint}', which leads to no joint that could move it")
-        if mimic.joint in moving:
-            raise ModelError(
-                f"joint '{name}' mimics '{mimic.joint}', which moves; mimic joints are not supported: "
-                f"leave '{mimic.joint}' out of the joints that move, or lock '{name}'"
-            )
-        return mimic.multiplier * value(mimic.joint, (*followers, name)) + mimic.offset
-
-    held = [name for name, joint in by_name.items() if joint.kind != "fixed" and name not in moving]
-    return {name: value(name, (name,)) for name in held}
+    moves = set(moving)
+    held = [name for name, joint in by_name.items() if joint.kind != "fixed" and name not in moves]
+    for name in held:
+        followers: dict[str, Mimic] = {}
+        leader = name
+        while leader not in values and (mimic := by_name[leader].mimic) is not None:
+            followers[leader] = mimic
+            if mimic.joint in followers or mimic.joint not in by_name:
+                raise ModelError(f"joint '{leader}' mimics '{mimic.joint}', which leads to no joint that could move it")
+            if mimic.joint in moves:
+                raise ModelError(
+                    f"joint '{leader}' mimics '{mimic.joint}', which moves; mimic joints are not supported: "
+                    f"leave '{mimic.joint}' out of the joints that move, or lock '{leader}'"
+                )
+            leader = mimic.joint
+        for follower, mimic in reversed(followers.items()):
+            values[follower] = mimic.multiplier * values.get(mimic.joint, 0.0) + mimic.offset
+    if far := [name for name in held if not abs(values.get(name, 0.0)) <= _FAR]:
+        raise ModelError(f"joint '{far[0]}' is held at {values[far[0]]:g}; expected at most {_FAR:g} in size")
+    return {name: values.get(name, 0.0) for name in held}
 
 
 def _check_masses(drafts: Sequence[_Draft]) -> None:
@@ -166,7 +172,7 @@ def _check_masses(drafts: Sequence[_Draft]) -> None:
         smallest, _, largest = np.linalg.eigvalsh(about_com)
         if smallest < -_NEGATIVE * max(abs(largest), abs(smallest) / 2, 1e-9):
             others = [name for name in draft.frames if name != draft.name]
-            merged = f" (with {', '.join(others)}, which move with it)" if others else ""
+            merged = f" (with {listed(others)}, which move with it)" if others else ""
             raise ModelError(
                 f"link '{draft.name}'{merged} has an inertia with the negative principal value {smallest:.3g} kg m²"
             )
@@ -194,9 +200,9 @@ def _connect(links: Sequence[Link], joints: Sequence[Joint]) -> tuple[str, dict[
         reached.update(found)
         pending.extend(found)
     if loop := [name for name in names if name not in reached]:
-        raise ModelError(f"the joints form a loop through the links {', '.join(loop)}; expected a tree")
+        raise ModelError(f"the joints form a loop through the links {listed(loop)}; expected a tree")
     if len(roots) != 1:
-        raise ModelError(f"the links form {len(roots)} trees, with the roots {', '.join(roots)}; expected one root")
+        raise ModelError(f"the links form {len(roots)} trees, with the roots {listed(roots)}; expected one root")
     return roots[0], below
 
 

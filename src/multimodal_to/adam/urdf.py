@@ -6,7 +6,7 @@ import io
 import logging
 import os
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,19 @@ from lxml import etree
 
 from multimodal_to.adam.lean_tree import build_tree
 from multimodal_to.adam.tree import Joint, Link, Mimic, Tree
-from multimodal_to.errors import ModelError
+from multimodal_to.errors import ModelError, listed, shortened
+from multimodal_to.reading import read_bytes
 
+LARGEST_URDF = 10_000_000
+"""The largest URDF that is read [byte]."""
+MOST_ELEMENTS = 50_000
+"""The most XML elements of a URDF; a humanoid with all its visuals has a tenth."""
+MOST_LINKS = 1_000
+"""The most links of a robot, and the most joints: each takes some milliseconds before anything is computed with it."""
+LARGEST_NUMBER = 1e9
+"""No length [m], angle [rad], mass [kg] or inertia [kg m²] is larger; limits of joints may be."""
+
+_ENTITIES = "declares a document type, whose entities are not read; write out what they stand for"
 _MOVING = ("revolute", "continuous", "prismatic")
 _SUPPORTED = (*_MOVING, "fixed")
 _NO_DIRECTION = 1e-6
@@ -39,7 +50,7 @@ def load_tree(
         locked: positions [rad or m] of joints that can move but are not in `joint_names`; zero where not given.
 
     Raises:
-        ModelError: the file is missing or no URDF, or it describes something that no robot can have.
+        ModelError: the file is missing, too large or no URDF, or it describes something that no robot can have.
     """
     links, joints = read_urdf(urdf)
     if isinstance(joint_names, str):
@@ -51,27 +62,40 @@ def load_tree(
 
 def read_urdf(urdf: str | os.PathLike[str]) -> tuple[list[Link], list[Joint]]:
     """Return the links and joints of a URDF (a path, or the XML text itself), checked one by one."""
-    robot = _parse(urdf)
-    _refuse_duplicates("link", (link.name for link in robot.links))
-    _refuse_duplicates("joint", (joint.name for joint in robot.joints))
-    if not robot.links:
-        raise ModelError("the URDF holds no links")
+    robot = parse_urdf(urdf)
     return [_link(link) for link in robot.links], [_joint(joint) for joint in robot.joints]
 
 
-def _parse(urdf: str | os.PathLike[str]) -> Any:
+def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
+    """Return what a URDF holds as `yourdfpy` has it: its links with their visuals, joints and materials.
+
+    No mesh is looked for. Every element that is kept has what it cannot do without, in finite numbers, and names are
+    not given twice; whether the joints form a tree, `load_tree` says.
+
+    Raises:
+        ModelError: the file is missing, larger than `LARGEST_URDF` or no URDF, or it has no links, or more than
+            `MOST_LINKS` or `MOST_ELEMENTS`.
+    """
     text, source = _read(urdf)
     try:
         # Entities are not expanded and nothing is fetched: a URDF from elsewhere is only text.
-        root = etree.fromstring(text, etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True))
+        root = etree.fromstring(text, etree.XMLParser(
+            resolve_entities=False, load_dtd=False, no_network=True, remove_comments=True, remove_pis=True,
+        ))  # fmt: skip
     except (etree.XMLSyntaxError, ValueError) as error:
+        if b"<!DOCTYPE" in text:  # whose entities the parser has stumbled over
+            raise ModelError(f"{source} {_ENTITIES}") from error
         raise ModelError(f"{source} is not valid XML: {error}") from error
     if root.getroottree().docinfo.internalDTD is not None:
-        raise ModelError(f"{source} declares a document type; entities are not read")
+        raise ModelError(f"{source} {_ENTITIES}")
     if root.tag != "robot":
         raise ModelError(f"{source} is no URDF: its root element is <{root.tag}>, expected <robot>")
+    if (count := sum(1 for _ in root.iter())) > MOST_ELEMENTS:
+        raise ModelError(f"{source} has {count} elements; at most {MOST_ELEMENTS} are read")
     if root.get("name") is None:
         root.set("name", "robot")
+    _keep_what_is_used(root)
+    _check_names(root, source)
     _refuse_missing(root, source)
     _refuse_non_numbers(root, source)
     logger = logging.getLogger("yourdfpy")
@@ -83,24 +107,53 @@ def _parse(urdf: str | os.PathLike[str]) -> Any:
             build_collision_scene_graph=False, load_collision_meshes=False,
         ).robot  # fmt: skip
     except Exception as error:  # yourdfpy raises whatever its parsing runs into
-        raise ModelError(f"{source} is no URDF that can be read: {error!r}") from error
+        raise ModelError(f"{source} is no URDF that can be read: {error}") from error
     finally:
         logger.setLevel(level)
 
 
 def _read(urdf: str | os.PathLike[str]) -> tuple[bytes, str]:
     if isinstance(urdf, str) and urdf.lstrip().startswith("<"):
-        return urdf.strip().encode(), "the URDF text"
-    path = Path(urdf)
-    try:
-        return path.read_bytes(), f"'{path}'"
-    except (OSError, ValueError) as error:
-        raise ModelError(f"cannot read the URDF '{str(path)[:200]}': {getattr(error, 'strerror', error)}") from error
+        if len(urdf) > LARGEST_URDF:
+            raise ModelError(f"the URDF text is longer than {LARGEST_URDF / 1e6:g} MB, the most that is read")
+        return urdf.strip().encode("utf-8", errors="replace"), "the URDF text"
+    return read_bytes(urdf, LARGEST_URDF, ModelError), f"'{Path(urdf)}'"
 
 
+_USED = ("link", "joint", "material")
+_USED_WITHIN = {"link": ("inertial", "visual"), "joint": ("parent", "child", "origin", "axis", "limit", "mimic")}
 _NEEDED = {"link": ("name",), "joint": ("name", "type")}
 _NEEDED_IN_JOINT = {"parent": "link", "child": "link"}
-_NEEDED_NUMBERS = {"mass": ("value",), "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "axis": ("xyz",)}
+_NEEDED_WITHIN = {
+    "mass": ("value",), "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "axis": ("xyz",), "mimic": ("joint",),
+    "box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "mesh": ("filename",),
+}  # fmt: skip
+_SHAPES = ("box", "cylinder", "sphere", "mesh")
+
+
+def _keep_what_is_used(root: Any) -> None:
+    """Drop what is neither a body, a joint nor something to draw: it may be of any form, and nothing here reads it."""
+    for owner in (root, *root.iterchildren("link", "joint")):
+        used = _USED_WITHIN.get(owner.tag, _USED)
+        for element in [child for child in owner if child.tag not in used]:
+            owner.remove(element)
+    for visual in [*root.iterfind("link/visual")]:
+        geometry = visual.find("geometry")
+        if geometry is None or not len(geometry) or geometry[0].tag not in _SHAPES:
+            visual.getparent().remove(visual)
+
+
+def _check_names(root: Any, source: str) -> None:
+    """Refuse a URDF of no link, of too many links or joints, or of two with one name."""
+    for kind in ("link", "joint"):
+        names = [element.get("name") for element in root.iterfind(kind)]
+        if kind == "link" and not names:
+            raise ModelError(f"{source} holds no links")
+        if len(names) > MOST_LINKS:
+            raise ModelError(f"{source} has {len(names)} {kind}s; at most {MOST_LINKS} are read")
+        counts = Counter(names)
+        if repeated := [name for name, count in counts.items() if count > 1 and name]:
+            raise ModelError(f"{source} has more than one {kind} named {listed(repeated)}")
 
 
 def _refuse_missing(root: Any, source: str) -> None:
@@ -114,38 +167,44 @@ def _refuse_missing(root: Any, source: str) -> None:
             child = element.find(tag)
             if child is None or not child.get(key):
                 raise ModelError(f"{source}: {owner} names no {tag} link")
-        for child in element.iter(*_NEEDED_NUMBERS):
-            if missing := [key for key in _NEEDED_NUMBERS[child.tag] if child.get(key) is None]:
+        for child in element.iter(*_NEEDED_WITHIN):
+            if missing := [key for key in _NEEDED_WITHIN[child.tag] if child.get(key) is None]:
                 raise ModelError(f"{source}: <{child.tag}> in {owner} has no {', '.join(missing)}")
+
+
+_COUNTS: Mapping[str, Mapping[str, tuple[int, ...]]] = {
+    "origin": {"xyz": (3,), "rpy": (3,)}, "axis": {"xyz": (3,)}, "mass": {"value": (1,)},
+    "inertia": dict.fromkeys(_NEEDED_WITHIN["inertia"], (1,)), "mimic": {"multiplier": (1,), "offset": (1,)},
+    "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), (1,)),
+    "box": {"size": (3,)}, "cylinder": {"radius": (1,), "length": (1,)}, "sphere": {"radius": (1,)},
+    "mesh": {"scale": (1, 3)}, "color": {"rgba": (3, 4)},
+}  # fmt: skip
+"""How many numbers the attributes of each element hold."""
 
 
 def _refuse_non_numbers(root: Any, source: str) -> None:
     """Name the attribute that holds no finite number, before it turns into a NaN somewhere."""
-    for element in root.iter("origin", "axis", "mass", "inertia", "limit", "mimic"):
-        for key, value in element.attrib.items():
-            if key == "joint":
-                continue
-            count = 3 if key in ("xyz", "rpy") else 1
-            infinite = element.tag == "limit" and "inf" in value.lower()
-            if not infinite and not _finite(value, count):
+    for element in root.iter(*_COUNTS):
+        for key, counts in _COUNTS[element.tag].items():
+            text, largest = element.get(key), np.inf if element.tag == "limit" else LARGEST_NUMBER
+            if text is not None and (wrong := _number_fault(text, counts, largest)) is not None:
                 owner = next(up for up in element.iterancestors() if up.get("name") or up.tag == "robot")
-                expected = "a finite number" if count == 1 else f"{count} finite numbers"
                 raise ModelError(
-                    f"{source}: {key}=\"{value}\" of <{element.tag}> in '{owner.get('name')}' is not {expected}"
+                    f"{source}: {key}=\"{shortened(text, 60)}\" of <{element.tag}> in '{owner.get('name')}' {wrong}"
                 )
 
 
-def _finite(text: str, count: int) -> bool:
+def _number_fault(text: str, counts: Sequence[int], largest: float) -> str | None:
+    """Return what is wrong with a text of numbers, as the end of a sentence about it."""
+    finite = "is not a finite number" if counts == (1,) else f"is not {counts[-1]} finite numbers"
     try:
-        numbers = [float(word) for word in text.split()]
+        numbers = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:
-        return False
-    return len(numbers) == count and bool(np.isfinite(numbers).all())
-
-
-def _refuse_duplicates(kind: str, names: Iterable[str]) -> None:
-    if repeated := [name for name, count in Counter(names).items() if count > 1]:
-        raise ModelError(f"the URDF has more than one {kind} named {', '.join(repeated)}")
+        return finite
+    if len(numbers) not in counts or np.isnan(numbers).any():
+        return finite
+    greatest = max(map(abs, numbers))
+    return None if greatest <= largest else finite if np.isinf(greatest) else f"is larger than {largest:g}"
 
 
 def _link(link: Any) -> Link:

@@ -19,7 +19,7 @@ from rich.console import Console
 from multimodal_to.cli import solving, showing, judging  # noqa: F401
 
 # isort: on
-from multimodal_to.cli.common import app, out
+from multimodal_to.cli.common import app, out, remove_unused
 from multimodal_to.errors import MultimodalError
 
 __all__ = ["app", "main"]
@@ -43,11 +43,12 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
+    context: typer.Context,
     show_version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and leave.")
     ] = False,
 ) -> None:
-    pass
+    context.call_on_close(remove_unused)
 
 
 def _show_warning(message: Warning | str, *_: object) -> None:

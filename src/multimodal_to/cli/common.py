@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Annotated
@@ -10,7 +11,7 @@ import typer
 from rich.console import Console
 
 from multimodal_to.audit import Audit
-from multimodal_to.errors import InputError, OutputError
+from multimodal_to.errors import InputError, OutputError, TrajectoryError, listed
 from multimodal_to.importing import import_arrays
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.ocp.scenario import Scenario
@@ -25,7 +26,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-out = Console(highlight=False)
+out = Console(highlight=False, markup=False, emoji=False)
 
 File = Annotated[Path, typer.Argument(help="Trajectory file, as `solve` writes it.")]
 ScenarioName = Annotated[str, typer.Argument(help="Scenario, as `list` shows it, or a TOML file of one.")]
@@ -51,18 +52,50 @@ def loaded(file: Path, robot: str) -> tuple[Robot, Trajectory]:
         the_robot = load_robot(robot)
         return the_robot, import_arrays(the_robot, file)
     trajectory = Trajectory.load(file)
-    return load_robot(robot or trajectory.robot).with_jets(trajectory.jet_names), trajectory
+    if not robot and (Path(trajectory.robot).name != trajectory.robot or trajectory.robot in ("", "..")):
+        raise TrajectoryError(
+            f"'{file}' names its robot as the path '{trajectory.robot}', which is not followed; name the robot with "
+            "--robot"
+        )
+    the_robot = load_robot(robot or trajectory.robot).with_jets(trajectory.jet_names)
+    for label, here, there in (
+        ("joints", the_robot.joint_names, trajectory.joint_names),
+        ("contact points", the_robot.contact_names, trajectory.contact_names),
+    ):
+        if here != there:
+            raise TrajectoryError(
+                f"'{file}' is for another robot: its {label} are {listed(there)}; those of {the_robot.name} are "
+                f"{listed(here)}"
+            )
+    return the_robot, trajectory
 
 
 def writable(folder: Path) -> Path:
-    """Make a folder if it is missing and make sure that files can be written there."""
+    """Make a folder if it is missing and make sure that files can be written there.
+
+    A folder that was made for a command that then writes nothing goes again when it ends (`remove_unused`).
+    """
     try:
+        missing = [path for path in (folder, *folder.parents) if not path.exists()]
         folder.mkdir(parents=True, exist_ok=True)
+        _made.extend(missing)
         with TemporaryFile(dir=folder):
             pass
-    except OSError as error:
-        raise OutputError(f"cannot write to the folder '{folder}': {error.strerror or error}") from error
+    except (OSError, ValueError) as error:
+        raise OutputError(
+            f"cannot write to the folder '{folder}': {getattr(error, 'strerror', None) or error}"
+        ) from error
     return folder
+
+
+_made: list[Path] = []  # folders made for the command that runs, inner ones first
+
+
+def remove_unused() -> None:
+    """Remove the folders that were made for a command and are still empty."""
+    while _made:
+        with suppress(OSError):  # it holds something, or is gone
+            _made.pop(0).rmdir()
 
 
 def writable_file(path: Path, suffix: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -129,7 +130,7 @@ def robot_info(
 
     Example: multimodal-to robot info ironcub
     """
-    if Path(path).is_file():
+    if os.path.isfile(path):
         description = describe(path)
     else:
         the_robot = load_robot(path)

@@ -156,7 +156,7 @@ def solve(
     """
     task = given(name, settings, robot, warm_start=warm_start, resume=resume)
     scenario, solver = task.scenario, Ipopt(max_iterations=max_iterations, time_limit=time_limit)
-    console = Console(highlight=False, quiet=quiet)
+    console = Console(highlight=False, markup=False, emoji=False, quiet=quiet)
     the_robot = load_robot(task.robot)
     _refuse_hopeless(examine(the_robot, scenario), console, force)
     folder = writable(output or (Path("results") / scenario.name if resume is None else resume.parent))

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import math
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam import KinDynComputations
-from multimodal_to.errors import ModelError, MultimodalError, unknown
+from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
 from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import Jet, JetModel
-from multimodal_to.reading import read_toml
+from multimodal_to.reading import Table, read_toml
 
 Array = NDArray[np.float64]
 
@@ -126,79 +125,17 @@ def load_robot(robot: str | os.PathLike[str]) -> Robot:
     """
     bundled = bundled_robots()
     folder = bundled.get(str(robot), Path(robot))
-    if not folder.is_dir():
+    if not os.path.isdir(folder):  # which takes names that no folder can have, too
         raise ModelError(f"{unknown('robot', str(robot), bundled)}; nor is there a folder of that name")
     path = folder / ROBOT_FILE
     table = read_toml(path, ModelError)
     try:
-        return _robot(_Table(table, "the top level"), folder)
+        return _robot(Table(table, "the top level", ModelError), folder)
     except MultimodalError as error:
         raise ModelError(f"{path}: {error}") from error
 
 
-class _Table:
-    """A TOML table that is read key by key, so that what is missing, mistyped or left over gets named."""
-
-    def __init__(self, content: Mapping[str, Any], where: str) -> None:
-        self._content, self._where, self._read = content, where, set[str]()
-
-    def _take(self, key: str) -> Any:
-        self._read.add(key)
-        if key not in self._content:
-            raise ModelError(f"{self._where} lacks '{key}'")
-        return self._content[key]
-
-    def text(self, key: str) -> str:
-        value = self._take(key)
-        if not isinstance(value, str):
-            raise ModelError(f"'{key}' in {self._where} is {value!r}; expected a text")
-        return value
-
-    def number(self, key: str, default: float | None = None) -> float:
-        if default is not None and key not in self._content:
-            return default
-        value = self._take(key)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise ModelError(f"'{key}' in {self._where} is {value!r}; expected a finite number")
-        return float(value)
-
-    def numbers(self, key: str, count: int) -> Array:
-        value = self._take(key)
-        good = isinstance(value, list) and len(value) == count
-        if not good or not all(isinstance(x, int | float) and math.isfinite(x) for x in value):
-            raise ModelError(f"'{key}' in {self._where} is {value!r}; expected {count} finite numbers")
-        return np.array(value, dtype=float)
-
-    def texts(self, key: str) -> tuple[str, ...]:
-        value = self._take(key)
-        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-            raise ModelError(f"'{key}' in {self._where} is {value!r}; expected a list of names")
-        return tuple(value)
-
-    def table(self, key: str) -> _Table:
-        value = self._take(key)
-        if not isinstance(value, dict):
-            raise ModelError(f"'{key}' in {self._where} is {value!r}; expected a table")
-        return _Table(value, f"[{key}]")
-
-    def tables(self, key: str) -> list[_Table]:
-        value = self._content.get(key, [])
-        self._read.add(key)
-        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
-            raise ModelError(f"'{key}' in {self._where} is {value!r}; expected tables, [[{key}]]")
-        return [_Table(item, f"[[{key}]] number {index + 1}") for index, item in enumerate(value)]
-
-    def names(self) -> list[str]:
-        return list(self._content)
-
-    def done(self) -> None:
-        """Refuse keys that nothing has asked for."""
-        for key in self._content:
-            if key not in self._read:
-                raise ModelError(f"{self._where}: {unknown('key', key, sorted(self._read))}")
-
-
-def _robot(table: _Table, folder: Path) -> Robot:
+def _robot(table: Table, folder: Path) -> Robot:
     name, urdf = table.text("name"), folder / table.text("urdf")
     if folder.resolve() not in urdf.resolve().parents:
         raise ModelError(f"'urdf' is '{urdf}', which is outside the robot's folder")
@@ -219,6 +156,8 @@ def _robot(table: _Table, folder: Path) -> Robot:
     feet = contact.table("feet")
     contacts = tuple(ContactPoint(frame=frame, foot=foot) for foot in feet.names() for frame in feet.texts(foot))
     jets = _jets(table)
+    _refuse_repeated("contact point", [point.frame for point in contacts])
+    _refuse_repeated("jet", [jet.name for jet in jets])
     for frame in (*(point.frame for point in contacts), *(jet.frame for jet in jets)):
         kindyn.tree.frame(frame)
     quaternion = home.numbers("base_quaternion_xyzw", 4)
@@ -237,7 +176,12 @@ def _robot(table: _Table, folder: Path) -> Robot:
     )  # fmt: skip
 
 
-def _joints(joints: _Table, names: Sequence[str], kindyn: KinDynComputations) -> tuple[JointLimits, Array]:
+def _refuse_repeated(kind: str, names: Sequence[str]) -> None:
+    if repeated := [name for name, count in Counter(names).items() if count > 1]:
+        raise ModelError(f"{kind} given twice: {listed(repeated)}")
+
+
+def _joints(joints: Table, names: Sequence[str], kindyn: KinDynComputations) -> tuple[JointLimits, Array]:
     rows = []
     for name in names:
         entry = joints.table(name)
@@ -254,7 +198,7 @@ def _joints(joints: _Table, names: Sequence[str], kindyn: KinDynComputations) ->
     return JointLimits(lower=columns[0], upper=columns[1], speed=columns[2], effort=effort), columns[3]
 
 
-def _jets(table: _Table) -> tuple[Jet, ...]:
+def _jets(table: Table) -> tuple[Jet, ...]:
     coefficients = tuple(JetModel.__dataclass_fields__)
     entries = table.tables("jet")
     models: dict[str, JetModel] = {}

@@ -188,7 +188,8 @@ class HeightField(Relief):
     10 n m operations per contact point, so take the nodes no closer than the terrain needs.
 
     Raises:
-        InputError: the heights are no grid of at least 4 by 4 finite numbers, or a range does not rise.
+        InputError: the heights are no grid of at least 4 by 4 and at most `MOST_NODES` finite numbers, or a range does
+            not rise.
     """
 
     x_range: Vector2  # x of the first and last row of nodes [m]
@@ -204,6 +205,8 @@ class HeightField(Relief):
             least = bspline.LEAST_NODES
             raise InputError(f"the height field has {len(self.heights)} rows of {sorted(lengths)} heights; expected "
                              f"rows of one length, and at least {least} by {least}")  # fmt: skip
+        if (nodes := len(self.heights) * len(self.heights[0])) > MOST_NODES:
+            raise InputError(f"the height field has {nodes} nodes; expected at most {MOST_NODES}")
         _finite("heights", *(number for row in self.heights for number in row))
         object.__setattr__(self, "heights", tuple(tuple(map(float, row)) for row in self.heights))
 
@@ -233,6 +236,9 @@ class HeightField(Relief):
         height, along_u, along_v = bspline.evaluate(self._coefficients, u, v)
         return height, along_u * per_x, along_v * per_y
 
+
+MOST_NODES = 40_000
+"""The most nodes of a height field: with more, expressions take minutes to build."""
 
 SURFACES: Mapping[str, type[FlatGround | Plane | Stairs | HeightField]] = MappingProxyType(
     {"flat": FlatGround, "plane": Plane, "stairs": Stairs, "height-field": HeightField}

@@ -8,11 +8,15 @@ from dataclasses import dataclass, field, fields
 from enum import Enum
 from types import MappingProxyType
 
-from multimodal_to.errors import ScenarioError
+from multimodal_to.errors import ScenarioError, shown
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.terrain import FlatGround, Surface
 
 Vector3 = tuple[float, float, float]
+
+MOST_KNOTS = 10_000
+"""More knots than this are a slip of the pen, and would fill any memory."""
+_LONGEST_NAME = 100
 
 
 class Start(Enum):
@@ -105,13 +109,26 @@ class Scenario:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "allowances", MappingProxyType(dict(self.allowances)))
+        self._check_name()
         self._check_numbers()
         self._check_positions()
         self._check_reach()
 
+    def _check_name(self) -> None:
+        """Refuse a name that is no plain one, since results go to a folder of that name, and titles no screen takes."""
+        plain = self.name.isprintable() and not set(self.name) & set("/\\") and self.name.strip(". ")
+        if not plain or len(self.name) > _LONGEST_NAME:
+            raise ScenarioError(
+                f"name is {shown(self.name)}; expected one that a folder can have, of at most {_LONGEST_NAME} "
+                "characters and none of / and \\"
+            )
+
+        if any(character < " " and character != "\n" for character in self.title):
+            raise ScenarioError(f"title is {shown(self.title)}; expected a text without control characters")
+
     def _check_numbers(self) -> None:
-        if self.knots < 3:
-            raise ScenarioError(f"knots is {self.knots}; expected at least 3")
+        if not 3 <= self.knots <= MOST_KNOTS:
+            raise ScenarioError(f"knots is {shown(self.knots)}; expected 3 to {MOST_KNOTS}")
         if not (0 < self.interval_min <= self.interval_max < math.inf):
             raise ScenarioError(
                 f"interval_min is {self.interval_min} s and interval_max {self.interval_max} s; "
@@ -121,8 +138,8 @@ class Scenario:
             value = getattr(self, label)
             if value is not None and not 0 < value < math.inf:
                 raise ScenarioError(f"{label} is {value}; expected a positive number")
-        if self.guess_steps < 0:
-            raise ScenarioError(f"guess_steps is {self.guess_steps}; expected a number of at least zero")
+        if not 0 <= self.guess_steps <= self.knots:
+            raise ScenarioError(f"guess_steps is {shown(self.guess_steps)}; expected 0 to the number of knots")
 
     def _check_positions(self) -> None:
         for label in ("initial_com", "final_com", "com_range"):

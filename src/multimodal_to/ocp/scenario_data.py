@@ -7,16 +7,16 @@ surface is a table with its `kind`. What has no value is left out.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from enum import Enum
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
-from multimodal_to.errors import InputError, ScenarioError, unknown
+from multimodal_to.errors import InputError, ScenarioError, shown, unknown
 from multimodal_to.models.terrain import SURFACES, Surface
 from multimodal_to.ocp.scenario import Scenario
+from multimodal_to.reading import is_number
 from multimodal_to.trajectory import Trajectory
 
 HEIGHTS = {"initial_com_height": "initial_com", "final_com_height": "final_com"}
@@ -45,6 +45,8 @@ def from_dict(table: Mapping[str, Any], base: Scenario | None = None) -> Scenari
     Raises:
         ScenarioError: a key is unknown or missing, or a value is not what its key takes.
     """
+    if not isinstance(table, Mapping):
+        raise _wrong("the scenario", table, "a table")
     table = dict(table)
     for key, com in HEIGHTS.items():
         if key in table:
@@ -71,7 +73,7 @@ def stored(trajectory: Trajectory) -> Scenario | None:
         return None
     try:
         return from_dict(json.loads(trajectory.scenario_json))
-    except (json.JSONDecodeError, TypeError, ScenarioError) as error:
+    except (ValueError, RecursionError, ScenarioError) as error:
         raise ScenarioError(f"the scenario kept with '{trajectory.scenario}' cannot be read: {error}") from error
 
 
@@ -115,7 +117,7 @@ def _surface(table: Any, where: str, base: Surface | None) -> Surface:
     names = {kind: name for name, kind in SURFACES.items()}
     own = names.get(type(base))  # type: ignore[arg-type]
     name = table.get("kind", own)
-    if name not in SURFACES:
+    if not isinstance(name, str) or name not in SURFACES:
         raise _wrong(f"{where}.kind", name, f"one of {', '.join(SURFACES)}")
     rest = {key: value for key, value in table.items() if key != "kind"}
     try:
@@ -168,10 +170,10 @@ def _scalar(kind: Any, value: Any, key: str) -> Any:
 
 
 def _number(value: Any, key: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_number(value):
         raise _wrong(key, value, "a finite number")
     return float(value)
 
 
 def _wrong(key: str, value: Any, expected: str) -> ScenarioError:
-    return ScenarioError(f"'{key}' is {value!r}; expected {expected}")
+    return ScenarioError(f"'{key}' is {shown(value)}; expected {expected}")

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from multimodal_to.adam.urdf import parse_urdf
 from multimodal_to.derived import frame_poses
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.meshes import shaded
 from multimodal_to.replay.scene import Y_TO_Z, Scene, SmoothMesh, quaternions, shapes
-from multimodal_to.replay.visuals import Appearance, Visual, parse
+from multimodal_to.replay.visuals import Appearance, Visual
 from multimodal_to.trajectory import Array, Trajectory
 
 Drawn = tuple[Any, Any, Array]
@@ -20,15 +21,17 @@ Drawn = tuple[Any, Any, Array]
 
 def link_paths(robot: Robot, appearance: Appearance, root: str) -> dict[str, str]:
     """Return where in the scene the links are that have a shape or a jet: each below the nearest such link above it."""
-    described = parse(robot.urdf)
+    described = parse_urdf(robot.urdf)
     shown = {visual.link for visual in appearance.visuals} | {jet.frame for jet in robot.jets}
     above = {joint.child: joint.parent for joint in described.joints}
 
     def path(name: str) -> str:
-        parent = above.get(name)
-        while parent is not None and parent not in shown:
-            parent = above.get(parent)
-        return f"{root}/{name}" if parent is None else f"{path(parent)}/{name}"
+        parts, link = [name], above.get(name)
+        while link is not None:
+            if link in shown:
+                parts.append(link)
+            link = above.get(link)
+        return "/".join([root, *reversed(parts)])
 
     return {link.name: path(link.name) for link in described.links if link.name in shown}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.errors import ModelError, unknown
-from multimodal_to.reading import read_toml
+from multimodal_to.reading import Table, read_toml
 from multimodal_to.replay.meshes import package_file
 from multimodal_to.trajectory import Array
 
@@ -66,15 +65,19 @@ class Dress:
 
 def zero_poses(robot: Any, root: str) -> dict[str, Array]:
     """Return root_H_link, (4, 4), of every link of a URDF below the root, with all joints at zero."""
+    links = {link.name for link in robot.links}
     children: dict[str, list[Any]] = {}
     for joint in robot.joints:
-        children.setdefault(joint.parent, []).append(joint)
-    poses, waiting = {root: np.eye(4)}, [root]
+        if joint.child in links:
+            children.setdefault(joint.parent, []).append(joint)
+    waiting = [root] if root in links else []
+    poses = {name: np.eye(4) for name in waiting}
     while waiting:
         parent = waiting.pop()
         for joint in children.get(parent, []):
-            poses[joint.child] = poses[parent] @ (np.eye(4) if joint.origin is None else joint.origin)
-            waiting.append(joint.child)
+            if joint.child not in poses:  # a loop would never end
+                poses[joint.child] = poses[parent] @ (np.eye(4) if joint.origin is None else joint.origin)
+                waiting.append(joint.child)
     return poses
 
 
@@ -82,29 +85,33 @@ def read_dress(folder: Path) -> Dress | None:
     """Return what a robot's folder says of its clothes; None where it says nothing or their package is missing.
 
     Raises:
-        ModelError: the file is no TOML or lacks a key.
+        ModelError: the file is no TOML, lacks a key, or has one that is unknown or of a wrong value.
     """
     path = folder / DRESS_FILE
     if not path.is_file():
         return None
-    table = read_toml(path, ModelError)
+    table = Table(read_toml(path, ModelError), "the top level", ModelError)
     try:
-        package = str(table["package"])
-        urdf = package_file(package, str(table["urdf"]))
-        if urdf is None:
-            return None
-        return Dress(
-            urdf=urdf,
-            root=str(table["root"]),
-            garments=tuple(_garment(entry) for entry in table["garment"]),
-            kept=frozenset(table["kept"]),
-            attribution=str(table["attribution"]).format(version=metadata.version(package)),
-        )
-    except KeyError as error:
-        raise ModelError(f"'{path}' lacks {error}") from error
+        return _dress(table)
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from error
 
 
-def _garment(entry: Mapping[str, Any]) -> Garment:
-    link = str(entry["link"])
-    rgba = tuple(float(part) for part in entry["rgba"]) if "rgba" in entry else None
-    return Garment(link=link, source=str(entry.get("source", link)), at=str(entry.get("at", link)), rgba=rgba)
+def _dress(table: Table) -> Dress | None:
+    package, ending, attribution = (table.text(key) for key in ("package", "urdf", "attribution"))
+    root, kept = table.text("root"), frozenset(table.texts("kept"))
+    garments = tuple(_garment(entry) for entry in table.tables("garment"))
+    table.done()
+    urdf = package_file(package, ending)
+    if urdf is None:
+        return None
+    credit = attribution.replace("{version}", metadata.version(package))
+    return Dress(urdf=urdf, root=root, garments=garments, kept=kept, attribution=credit)
+
+
+def _garment(entry: Table) -> Garment:
+    link = entry.text("link")
+    rgba = tuple(np.clip(entry.numbers("rgba", 4), 0.0, 1.0).tolist()) if "rgba" in entry else None
+    garment = Garment(link=link, source=entry.text("source", link), at=entry.text("at", link), rgba=rgba)
+    entry.done()
+    return garment

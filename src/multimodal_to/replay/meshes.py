@@ -19,6 +19,11 @@ from multimodal_to.trajectory import Array
 ROOT_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH")
 """Environment variables that list folders in which packages of meshes lie."""
 
+SUFFIXES = (".stl", ".dae", ".obj", ".ply", ".glb", ".gltf", ".off")
+"""Kinds of mesh files that are read."""
+LARGEST_MESH = 200_000_000
+"""The largest mesh file that is read [byte]."""
+
 _POINTER = b"version https://git-lfs"
 _SCHEMES = ("package://", "model://")
 
@@ -44,12 +49,20 @@ def load_parts(uri: str, urdf: Path, scale: Array) -> list[Part]:
     """Return the triangles of a mesh that a URDF names, one part per colour of the file.
 
     Raises:
-        MultimodalError: the file is missing, outside its root, a git-LFS pointer, or no mesh.
+        MultimodalError: the file is missing, outside its root, a git-LFS pointer, too large, or no mesh.
     """
     file = find_mesh(uri, urdf)
-    with file.open("rb") as stream:
-        if stream.read(len(_POINTER)) == _POINTER:
-            raise _UnusableError("a git-LFS pointer; `git lfs pull` fetches the mesh")
+    if file.suffix.lower() not in SUFFIXES:
+        raise _UnusableError(f"no {', '.join(SUFFIXES)} file")
+    try:
+        with file.open("rb") as stream:
+            start, size = stream.read(len(_POINTER)), file.stat().st_size
+    except OSError as error:
+        raise _UnusableError(f"cannot be read: {error.strerror}") from error
+    if start == _POINTER:
+        raise _UnusableError("a git-LFS pointer; `git lfs pull` fetches the mesh")
+    if size > LARGEST_MESH:
+        raise _UnusableError(f"larger than {LARGEST_MESH / 1e6:g} MB")
     try:
         meshes = [mesh for mesh in trimesh.load_scene(file).dump() if isinstance(mesh, trimesh.Trimesh)]
     except Exception as error:  # readers of a dozen formats raise whatever they run into
@@ -77,11 +90,13 @@ def find_mesh(uri: str, urdf: Path) -> Path:
         path = Path(unquote(uri.removeprefix("file://")) if uri.startswith("file://") else uri)
         candidates = [(_own_root(urdf), urdf.absolute().parent / path)]
     refused = False
+    if "\0" in unquote(uri):
+        raise _UnusableError("not found")
     for root, candidate in candidates:
         plain = Path(os.path.normpath(candidate))
         if not plain.is_relative_to(os.path.normpath(root)):
             refused = True
-        elif plain.is_file():
+        elif os.path.isfile(plain):  # which takes names that no file can have, too
             return plain
     raise _UnusableError("leaves the folder of its robot" if refused else "not found")
 
@@ -113,7 +128,7 @@ def package_file(package: str, ending: str) -> Path | None:
     """Return the file of an installed package whose path ends so; None where the package is not installed."""
     try:
         files = metadata.files(package) or []
-    except metadata.PackageNotFoundError:
+    except (metadata.PackageNotFoundError, ValueError):
         return None
     found = (Path(str(file.locate())) for file in files if f"/{file.as_posix()}".endswith(f"/{ending}"))
     return next((Path(os.path.normpath(path)) for path in found if path.is_file()), None)

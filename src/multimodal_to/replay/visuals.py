@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yourdfpy
 
+from multimodal_to.adam.urdf import parse_urdf
 from multimodal_to.errors import MultimodalError
 from multimodal_to.replay.dress import Dress, read_dress
 from multimodal_to.replay.meshes import MeshWarning, Part, load_parts, simplified
@@ -33,7 +33,7 @@ class Visual:
     name: str
     transform: Array  # link_H_visual, (4, 4)
     rgba: tuple[float, ...]
-    primitive: yourdfpy.urdf.Geometry | None = None
+    primitive: Any = None  # the URDF's box, cylinder or sphere, as `parse_urdf` has it
     part: Part | None = None
 
 
@@ -50,7 +50,7 @@ def appearance(urdf: Path, *, meshes: bool = True) -> Appearance:
 
     Meshes that cannot be drawn are left out and named in one `MeshWarning`. Without `meshes` there are only primitives.
     """
-    robot = parse(urdf)
+    robot = parse_urdf(urdf)
     dress = read_dress(urdf.parent) if meshes else None
     problems: dict[str, str] = {}
     palette = {material.name: material for material in robot.materials}
@@ -63,11 +63,6 @@ def appearance(urdf: Path, *, meshes: bool = True) -> Appearance:
         found += _dressed(dress, robot, problems)
     _warn(problems)
     return Appearance(visuals=tuple(_thinned(found)), attribution=dress.attribution if dress else "")
-
-
-def parse(urdf: Path) -> Any:
-    """Return links, joints and materials of a URDF as `yourdfpy` has them; no mesh is looked for."""
-    return yourdfpy.URDF.load(str(urdf), build_scene_graph=False, load_meshes=False).robot
 
 
 def _shapes(
@@ -99,12 +94,15 @@ def _stated_colour(visual: Any, palette: Mapping[str, Any]) -> tuple[float, ...]
     material = visual.material
     if material is not None and material.color is None:
         material = palette.get(material.name)
-    return None if material is None or material.color is None else tuple(float(part) for part in material.color.rgba)
+    if material is None or material.color is None:
+        return None
+    red, green, blue, opacity = np.clip([*material.color.rgba, 1.0][:4], 0.0, 1.0).tolist()
+    return red, green, blue, opacity
 
 
 def _dressed(dress: Dress, robot: Any, problems: dict[str, str]) -> list[Visual]:
     """Return the meshes of the other model as visuals of this robot's links."""
-    other = parse(dress.urdf)
+    other = parse_urdf(dress.urdf)
     links, palette = {link.name: link for link in other.links}, {entry.name: entry for entry in other.materials}
     found = []
     for garment, placement in zip(dress.garments, dress.placements(robot, other), strict=True):
