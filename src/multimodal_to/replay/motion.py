@@ -11,7 +11,7 @@ import numpy as np
 from multimodal_to.derived import frame_poses
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
-from multimodal_to.models.terrain import FlatGround, Surface
+from multimodal_to.models.terrain import FlatGround, Surface, heights_below
 from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.replay.bodies import draw_links, draw_visuals, drawn, faded, link_paths, link_poses
 from multimodal_to.replay.effects import draw_com, draw_com_trace, draw_contact_forces, draw_flames
@@ -25,6 +25,9 @@ FOLLOW_FROM = 0.6
 """The camera follows the CoM along the ground in motions that go farther than this [m]."""
 
 _HALF_LEFT = np.array([-0.72, -0.66, 0.22])  # where the camera is, seen from a robot that faces −x
+_BEHIND_LEFT = np.array(
+    [0.45, -0.85, 0.30]
+)  # where it is if the ground rises towards the other one and hides its steps
 _FROM_THE_SIDE = 0.14  # how high the camera of a still scene is, per metre of distance
 _BAR = 0.12  # room below the robot for the buttons of the page, per metre of its height
 _STILL_ZOOM = 4.0  # from farther off, so that ghosts look alike
@@ -58,8 +61,9 @@ def draw_motion(
     follow = bool(np.linalg.norm(span) > FOLLOW_FROM)
     low, high = _extent(robot, trajectory, look.visuals, com - com[0] if follow else np.zeros_like(com))
     low[2] = min(low[2], 0.0) - _BAR * (high[2] - low[2])
-    view = _view(low, high, _HALF_LEFT)
-    draw_stage(scene, view, _surface(trajectory), reach=float(span.max()))
+    surface = _surface(trajectory)
+    view = _view(low, high, _BEHIND_LEFT if _rises(surface, com.mean(axis=0), _HALF_LEFT) else _HALF_LEFT)
+    draw_stage(scene, view, surface, reach=float(span.max()))
 
     paths = link_paths(robot, look, "robot")
     draw_links(scene, paths, link_poses(robot, trajectory, paths))
@@ -124,6 +128,13 @@ def _surface(trajectory: Trajectory) -> Surface:
     """Return the ground of the scenario that the trajectory keeps; flat where it keeps none."""
     scenario = stored(trajectory)
     return FlatGround() if scenario is None else scenario.surface
+
+
+def _rises(surface: Surface, place: Array, direction: Array) -> bool:
+    """Return whether the ground a metre from a place in a direction is higher than a metre the other way."""
+    step = np.array([*direction[:2], 0.0]) / np.linalg.norm(direction[:2])
+    ahead, behind = heights_below(surface, np.column_stack([place + step, place - step]))
+    return bool(ahead > behind + 0.01)
 
 
 def _frozen(trajectory: Trajectory, instants: Array) -> list[Trajectory]:
