@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import io
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from multimodal_to import replay
+from multimodal_to import replay, scenarios
 from multimodal_to.errors import InputError, OutputError
+from multimodal_to.models.terrain import Stairs
+from multimodal_to.ocp.scenario_data import to_json
 from multimodal_to.replay.browser import find_browser, open_browser
 from synthetic import DURATION, LIFT_OFF, take_off
 
@@ -153,3 +156,12 @@ def test_snapshots_are_taken_where_flight_begins_by_default(trajectory):
     assert LIFT_OFF in times
     assert times[0] == 0.0
     assert times[-1] == DURATION
+
+
+def test_ghosts_on_a_step_stand_apart(trajectory):
+    stairs = Stairs(edges=(0.3,), heights=(0.0, 0.1), direction=(-1.0, 0.0))
+    kept = to_json(replace(scenarios.take_off(), surface=stairs))
+    com = trajectory.com_position.copy()
+    com[0] = -0.5 * trajectory.time
+    walking = replace(trajectory, scenario_json=kept, com_position=com)
+    np.testing.assert_allclose(replay.snapshot_times(walking), [0.0, 1.0, DURATION])
