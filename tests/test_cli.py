@@ -19,10 +19,10 @@ from multimodal_to.trajectory import Trajectory
 from synthetic import take_off as synthetic_take_off
 
 
-def run(*arguments, cwd=None):
+def run(*arguments, cwd=None, columns=200):
     return subprocess.run(
         [sys.executable, "-m", "multimodal_to", *map(str, arguments)],
-        capture_output=True, text=True, cwd=cwd, timeout=300, check=False, env={**os.environ, "COLUMNS": "200"},
+        capture_output=True, text=True, cwd=cwd, timeout=300, check=False, env={**os.environ, "COLUMNS": str(columns)},
     )  # fmt: skip
 
 
@@ -69,27 +69,67 @@ def test_a_changed_scenario_is_solved_and_kept_in_the_file(tmp_path):
     assert run("show", file).stdout == scenario_files.to_toml(kept)
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        (),
-        ("doctor",),
-        ("solve",),
-        ("reproduce",),
-        ("plot",),
-        ("replay",),
-        ("audit",),
-        ("simulate",),
-        ("list",),
-        ("show",),
-        ("robot",),
-        ("robot", "info"),
-    ],
+COMMANDS = (
+    "list",
+    "show",
+    "doctor",
+    "solve",
+    "reproduce",
+    "plot",
+    "replay",
+    "report",
+    "export",
+    "audit",
+    "simulate",
+    "robot info",
 )
-def test_help_is_short(command):
-    result = run(*command, "--help")
+
+
+def test_help_lists_every_command():
+    names = re.findall(r"^  ([a-z]+)  ", run("--help").stdout, re.MULTILINE)
+    assert names == list(dict.fromkeys(command.split()[0] for command in COMMANDS))
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS, "robot"])
+def test_help_is_short_and_each_command_has_an_example(command):
+    result = run(*command.split(), "--help", columns=80)
     assert result.returncode == 0
     assert len(result.stdout.splitlines()) < 40
+    if command in COMMANDS:
+        assert f"Example: multimodal-to {command}" in " ".join(result.stdout.split())
+
+
+def completions(line, folder):
+    """What the shell offers for the last word of a line."""
+    words = line.split(" ")
+    environment = {"_MULTIMODAL_TO_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+    code = "import sys; sys.argv = ['multimodal-to']; from multimodal_to.cli import main; main()"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder, check=False,
+                            env={**os.environ, **environment}, timeout=60)  # fmt: skip
+    assert result.stderr == ""
+    return result.stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("multimodal-to re", ["reproduce", "replay", "report"]),
+        ("multimodal-to solve ta", ["take-off", "take-off-and-landing"]),
+        ("multimodal-to solve m", ["mine.toml"]),
+        ("multimodal-to doctor s", ["step-up"]),
+        ("multimodal-to show j", ["jump", "jump.npz"]),
+        ("multimodal-to reproduce take-off st", ["step-up"]),
+        ("multimodal-to plot a.npz --figure m", ["momentum", "margins"]),
+        ("multimodal-to export a.npz --to m", ["mat", "mujoco"]),
+        ("multimodal-to robot info i", ["ironcub"]),
+        ("multimodal-to audit a.npz --robot r", ["robots/"]),
+    ],
+)
+def test_the_shell_completes_names_and_files(line, offered, tmp_path):
+    for name in ("mine.toml", "mine.npy", "jump.npz"):
+        (tmp_path / name).touch()
+    (tmp_path / "robots").mkdir()
+    assert completions(line, tmp_path) == offered
 
 
 def test_robot_info_shows_the_tree_and_what_looks_wrong():
@@ -144,7 +184,8 @@ def test_a_bare_motion_is_nothing_to_go_on_with(file):
 
 
 def test_progress_names_iteration_objective_violation_and_time(stopped):
-    assert "iteration    0   objective" in stopped[1].stdout
+    assert "take-off took 94 iterations, by which the time left is guessed" in stopped[1].stdout
+    assert "time left not known yet   iteration    0   objective" in stopped[1].stdout
     assert "largest violation" in stopped[1].stdout
 
 

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from multimodal_to.cli.common import File, RobotOption, app, loaded, option_numbers, out, writable, writable_file
+from multimodal_to.cli.completion import exports, figures
 from multimodal_to.errors import InputError, OutputError, unknown
 from multimodal_to.export import EXPORTS
 from multimodal_to.models.robot import load_robot
@@ -19,7 +20,10 @@ from multimodal_to.trajectory import Trajectory
 def plot(
     files: Annotated[list[Path], typer.Argument(help="Trajectory files; several are drawn in one figure.")],
     figure: Annotated[
-        str, typer.Option(help="forces, com, momentum, joints, torques, contacts, margins, or all of them.")
+        str,
+        typer.Option(
+            help="forces, com, momentum, joints, torques, contacts, margins, or all of them.", autocompletion=figures
+        ),
     ] = "forces",
     output: Annotated[
         Path | None,
@@ -124,7 +128,7 @@ def report_file(
 @app.command("export")
 def export_file(
     file: File,
-    to: Annotated[str, typer.Option("--to", help="csv, mat, mujoco or pinocchio.")],
+    to: Annotated[str, typer.Option("--to", help="csv, mat, mujoco or pinocchio.", autocompletion=exports)],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write. [FILE.csv and so on]")] = None,
     robot: RobotOption = "",
 ) -> None:
