@@ -165,3 +165,25 @@ def test_ghosts_on_a_step_stand_apart(trajectory):
     com[0] = -0.5 * trajectory.time
     walking = replace(trajectory, scenario_json=kept, com_position=com)
     np.testing.assert_allclose(replay.snapshot_times(walking), [0.0, 1.0, DURATION])
+
+
+@needs_browser
+def test_a_replay_plays_in_the_frame_of_a_notebook(ironcub, trajectory, tmp_path):
+    cell = replay.embed(ironcub, trajectory, meshes=False, height=300)
+    (tmp_path / "notebook.html").write_text(
+        f"<!DOCTYPE html><body>{cell._repr_html_()}<script>let replay = {{}};</script></body>", encoding="utf-8"
+    )
+    with open_browser((600, 400)) as browser:
+        browser.open(tmp_path / "notebook.html")
+        inside = "document.querySelector('iframe').contentWindow.eval"
+        start = time.monotonic()
+        while not browser.evaluate(f"{inside}('typeof replay === \"object\" && replay.state.time > 0.1')"):
+            assert time.monotonic() - start < 60.0
+        height = browser.evaluate(f"{inside}('replay.viewer.renderer.domElement.clientHeight')")
+        assert height == 300
+        assert browser.errors == []
+
+
+def test_a_frame_without_height_is_refused(ironcub, trajectory):
+    with pytest.raises(InputError, match="height of the frame is 0"):
+        replay.embed(ironcub, trajectory, meshes=False, height=0)

@@ -19,10 +19,11 @@ from multimodal_to.trajectory import Trajectory
 from synthetic import take_off as synthetic_take_off
 
 
-def run(*arguments, cwd=None, columns=200):
+def run(*arguments, cwd=None, columns=200, **environment):
     return subprocess.run(
         [sys.executable, "-m", "multimodal_to", *map(str, arguments)],
-        capture_output=True, text=True, cwd=cwd, timeout=300, check=False, env={**os.environ, "COLUMNS": str(columns)},
+        capture_output=True, text=True, cwd=cwd, timeout=300, check=False,
+        env={**os.environ, "COLUMNS": str(columns), **environment},
     )  # fmt: skip
 
 
@@ -256,6 +257,8 @@ def test_bare_arrays_are_audited_once_their_robot_is_named(file, tmp_path):
             "unknown key 'final_height'; did you mean 'final_com_height'?",
         ),
         (("solve", "take-off", "--set", "knots=few"), "'knots' is 'few'; expected a whole number"),
+        (("show", "takeoff"), "unknown scenario 'takeoff'; did you mean 'take-off'?"),
+        (("show", "none.npz"), "no trajectory file 'none.npz'"),
         (("reproduce", "takeoff"), "unknown scenario 'takeoff'; did you mean 'take-off'?"),
         (("reproduce", "jump", "--published", "none"), "no .npz of a published trajectory in 'none'"),
         (("solve",), "nothing to solve; expected the NAME of a scenario, or --resume FILE"),
@@ -280,6 +283,18 @@ def test_bad_input_ends_in_one_sentence_and_two(tmp_path, arguments, sentence):
     assert result.stderr.count("\n") == 1
     assert sentence in result.stderr
     assert list(tmp_path.rglob("*.npz")) == []
+
+
+@pytest.mark.parametrize("arguments", [("list", "jump"), ("solve", "jump", "--fast"), ("export", "jump.npz"), ("fly",)])
+def test_what_no_command_takes_ends_in_usage_and_two(arguments):
+    result = run(*arguments)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr.startswith("Usage: ")
+
+
+def test_colour_is_for_terminals_only(file):
+    assert "\x1b" not in run("audit", file).stdout
+    assert "\x1b[1;31mFAILS" in run("audit", file, FORCE_COLOR="1", TERM="xterm-256color").stdout
 
 
 def test_a_folder_that_cannot_be_written_is_found_before_the_solve(tmp_path):

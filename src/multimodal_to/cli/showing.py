@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from itertools import takewhile
 from pathlib import Path
 from typing import Annotated
 
@@ -54,10 +55,12 @@ def plot(
 
 
 def _labels(files: list[Path], trajectories: list[Trajectory]) -> list[str]:
-    """Return a short name for each file: its scenario, or its path where two are of one scenario."""
+    """Return a short name for each file: its scenario, or what tells its path from those of others of its scenario."""
     scenarios = [trajectory.scenario for trajectory in trajectories]
+    paths = [file.parts for file, scenario in zip(files, scenarios, strict=True) if scenarios.count(scenario) > 1]
+    same_start = sum(1 for _ in takewhile(lambda parts: len(set(parts)) == 1, zip(*paths, strict=False)))
     return [
-        scenario if scenarios.count(scenario) == 1 else str(file)
+        scenario if scenarios.count(scenario) == 1 else "/".join(file.parts[same_start:]) or str(file)
         for scenario, file in zip(scenarios, files, strict=True)
     ]
 

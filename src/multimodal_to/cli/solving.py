@@ -45,7 +45,10 @@ _MISSES_SHOWN = 5
 
 @app.command("list")
 def list_scenarios() -> None:
-    """List the bundled scenarios with their numbers."""
+    """List the bundled scenarios with their numbers.
+
+    Example: multimodal-to list
+    """
     table = Table(Column(no_wrap=True), Column(), box=None, show_header=False, pad_edge=False)
     for make in SCENARIOS.values():
         scenario = make()
