@@ -69,6 +69,13 @@ def test_each_flight_has_its_own_band_but_one_entry_in_the_legend(robot, traject
     assert [text.get_text() for text in figure.axes[2].get_legend().get_texts()].count("flight") == 1
 
 
+def test_bands_of_several_runs_together_leave_the_data_visible(robot, trajectory):
+    panel = plotting.plot_com(robot, *[trajectory] * 4, labels=list("abcd")).axes[0]
+    bands_of_all = [patch for patch in panel.patches if isinstance(patch, Rectangle)]
+    assert len(bands_of_all) == 4
+    assert sum(band.get_alpha() for band in bands_of_all) <= 0.25
+
+
 def test_a_robot_that_stays_on_the_ground_has_no_band(robot, trajectory):
     forces = np.full_like(trajectory.contact_forces, 20.0)
     figure = plotting.plot_forces(robot, replace(trajectory, contact_forces=forces))
@@ -176,10 +183,11 @@ def drawn_texts(figure) -> list[Text]:
     beyond = set()
     for axes in figure.get_axes():
         for axis, limits in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
-            slack = 1e-9 * abs(limits[1] - limits[0])
+            low, high = sorted(limits)
+            low, high = low - 1e-9 * abs(low) - 1e-15, high + 1e-9 * abs(high) + 1e-15
             used = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
             for tick in {*axis.majorTicks, *axis.minorTicks, *used}:
-                if tick not in used or not min(limits) - slack <= tick.get_loc() <= max(limits) + slack:
+                if tick not in used or not low <= tick.get_loc() <= high:
                     beyond |= {tick.label1, tick.label2}
     texts = figure.findobj(lambda thing: isinstance(thing, Text) and thing.get_visible() and thing.get_text().strip())
     return [text for text in texts if text not in beyond]

@@ -102,9 +102,10 @@ def draw_limits(axes: Axes, values: Iterable[float], label: str | None) -> None:
 def draw_flight(all_axes: Iterable[Axes], runs: Sequence[Run], labelled: Axes | None = None) -> None:
     """Draw a translucent red band over the flight of every run, with one entry in the legend of one of the axes."""
     phases = [phase for run in runs for phase in flight_phases(run.trajectory)]
+    look = FLIGHT | {"alpha": FLIGHT["alpha"] * min(1.0, 2.0 / len(runs))}  # bands that lie over each other add up
     for axes in all_axes:
         for index, (start, end) in enumerate(phases):
-            axes.axvspan(start, end, label="flight" if axes is labelled and index == 0 else None, **FLIGHT)
+            axes.axvspan(start, end, label="flight" if axes is labelled and index == 0 else None, **look)
 
 
 def finish(all_axes: Iterable[Axes], least_span: float = 0.0) -> None:
