@@ -44,6 +44,7 @@ def test_the_report_says_how_it_was_solved(ironcub, trajectory, tmp_path):
     )  # fmt: skip
     solved = replace(trajectory, solve_json=record)
     text = write_report(ironcub, solved, tmp_path / "r.html", meshes=False).read_text(encoding="utf-8")
+    assert "<th>solver</th><td>optimal · Solve_Succeeded, 34.2 s</td>" in text
     rows = dict(re.findall(r"<tr><th>([^<]+)</th><td>([^<]+)</td></tr>", text.split("<h2>Solve</h2>")[1]))
     assert rows == {
         "status": "optimal · Solve_Succeeded", "iterations": "94", "time in the solver": "34.2 s",
@@ -58,6 +59,7 @@ def test_a_file_without_a_scenario_has_a_report_too(ironcub, tmp_path):
     text = path.read_text(encoding="utf-8")
     assert "The file keeps no scenario" in text
     assert "The file does not say how it was solved" in text
+    assert "<th>solver</th><td>not known</td>" in text
     assert "<h1>take-off &amp; hover · ironcub</h1>" in text
     assert not re.search(r'(src|href)="(?!data:)', text.split("<script>")[0])
 

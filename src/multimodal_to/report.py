@@ -72,12 +72,14 @@ def _summary(report: Audit) -> str:
 
 def _facts(robot: Robot, trajectory: Trajectory, report: Audit) -> dict[str, str]:
     versions = [f"{name} {metadata.version(name)}" for name in PACKAGES]
+    status, took = (_solve_facts(trajectory.solve_record())[name] for name in ("status", "time in the solver"))
     return {
         "scenario": trajectory.scenario,
         "robot": f"{robot.name}: {len(robot.joint_names)} joints, {robot.mass:.2f} kg, "
         f"{len(robot.contacts)} contact points, {len(robot.jets)} jets",
         "time": f"{report.duration:.2f} s in {trajectory.knots} intervals; longest flight {report.airborne:.2f} s",
         "thrust at the end": f"{100 * report.final_thrust_over_weight:.2f} % of the weight, vertically",
+        "solver": ", ".join(filter(None, (status, took))) or "not known",
         "report made with": ", ".join([*versions, f"Python {platform.python_version()}"]),
     }
 
