@@ -8,11 +8,14 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from multimodal_to import scenario_files, scenarios
+from multimodal_to.cli.showing import _labels
 from multimodal_to.models.terrain import Plane
 from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.trajectory import Trajectory
@@ -209,6 +212,13 @@ def test_all_figures_of_two_files_are_plotted_under_names_of_their_own(file, tmp
     assert result.returncode == 0
     names = sorted(path.stem.removeprefix("both-") for path in tmp_path.glob("*.png"))
     assert names == ["com", "contacts", "forces", "joints", "margins", "momentum", "torques"]
+
+
+def test_files_of_one_scenario_are_told_apart_by_what_differs_in_their_paths():
+    jump, hover = SimpleNamespace(scenario="jump"), SimpleNamespace(scenario="hover")
+    files = [Path(f"results/today/{name}/trajectory.npz") for name in ("a", "b", "hover")]
+    assert _labels(files, [jump, jump, hover]) == ["a/trajectory.npz", "b/trajectory.npz", "hover"]
+    assert _labels(files[:1] * 2, [jump, jump]) == [str(files[0])] * 2
 
 
 def test_report_and_export_read_a_saved_file(file, tmp_path):

@@ -34,7 +34,7 @@ def test_a_scenario_of_ones_own_is_expected_to_be_like_the_slowest_of_its_kind()
 
 
 def test_the_time_left_goes_by_the_pace_of_the_last_iterations():
-    rest = Rest(expectation=Expectation(iterations=40, like="x"))
+    rest = Rest(Expectation(iterations=40, like="x"))
     answers = [rest.after(iteration, 0.1 * iteration) for iteration in range(20)]
     assert answers[0] == "time left not known yet"
     assert answers[19] == "perhaps 2 s left"

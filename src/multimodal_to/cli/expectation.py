@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
 
 from multimodal_to.ocp.scenario import Scenario
@@ -37,9 +37,7 @@ def expect(scenario: Scenario) -> Expectation | None:
     """
     if scenario.name in TYPICAL_ITERATIONS:
         return Expectation(iterations=TYPICAL_ITERATIONS[scenario.name], like=scenario.name)
-    alike = [
-        name for name, make in SCENARIOS.items() if _kind(make()) == _kind(scenario) and name in TYPICAL_ITERATIONS
-    ]
+    alike = [name for name in TYPICAL_ITERATIONS if _kind(SCENARIOS[name]()) == _kind(scenario)]
     if not alike:
         return None
     slowest = max(alike, key=TYPICAL_ITERATIONS.__getitem__)
@@ -50,19 +48,19 @@ def _kind(scenario: Scenario) -> tuple[object, ...]:
     return scenario.start, scenario.terminal, scenario.jets, scenario.guess_steps > 0
 
 
-@dataclass(frozen=True, kw_only=True)
 class Rest:
     """The time left of a solve, at the pace of its last iterations."""
 
-    expectation: Expectation
-    _lately: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_LATELY))
+    def __init__(self, expectation: Expectation) -> None:
+        self._expectation = expectation
+        self._lately: deque[tuple[int, float]] = deque(maxlen=_LATELY)
 
     def after(self, iteration: int, elapsed: float) -> str:
         """Return in words what is left after an iteration [s since the start]."""
         self._lately.append((iteration, elapsed))
-        left = self.expectation.iterations - iteration
+        left = self._expectation.iterations - iteration
         if left <= 0:
-            return f"longer than {self.expectation.like}"
+            return f"longer than {self._expectation.like}"
         (first, start), (last, end) = self._lately[0], self._lately[-1]
         if last - first < _LATELY // 2:
             return "time left not known yet"

@@ -20,7 +20,7 @@ class Progress:
 
     def __init__(self, console: Console, expectation: Expectation | None = None) -> None:
         self._console = console
-        self._rest = None if expectation is None else Rest(expectation=expectation)
+        self._rest = None if expectation is None else Rest(expectation)
         self._live = Live(console=console, transient=True, refresh_per_second=4)
         self.interrupted = False
         self._printed = -_LINE_EVERY
