@@ -6,17 +6,29 @@ Chromium (`apt-get install chromium`), which takes the snapshots, and icub-model
 
 from pathlib import Path
 
+from PIL import Image
+
 import multimodal_to as mt
 from multimodal_to.plotting import plot_forces, save
 from multimodal_to.replay import write_snapshots
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "results"
+HEIGHT, COLOURS = 400, 256  # of the snapshots of each scenario
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
 
 
+def draw_snapshots(robot: mt.Robot, trajectory: mt.Trajectory, name: str) -> None:
+    """Write docs/NAME-snapshots.png: the robot at several times, small enough for a page that shows all scenarios."""
+    path = write_snapshots(robot.with_jets(trajectory.jet_names), trajectory, ROOT / "docs" / f"{name}-snapshots.png")
+    with Image.open(path) as picture:
+        size = (round(HEIGHT * picture.width / picture.height), HEIGHT)
+        small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS)
+    small.quantize(COLOURS, kmeans=4, dither=Image.Dither.NONE).save(path, optimize=True)
+
+
 def main() -> None:
-    """Write docs/take-off.png, docs/*-forces.png, and the tables between the marks."""
+    """Write docs/take-off.png, docs/*-snapshots.png, docs/*-forces.png, and the tables between the marks."""
     robot = mt.load_robot("ironcub")
     for name in ("take-off", "take-off-and-landing", "walk-to-fly", "jump"):
         trajectory = mt.Trajectory.load(RESULTS / name / "trajectory.npz")
@@ -24,6 +36,8 @@ def main() -> None:
         save(figure, ROOT / "docs" / f"{name}-forces.png")
         if name == "take-off":
             write_snapshots(robot, trajectory, ROOT / "docs" / "take-off.png")
+    for name in mt.scenarios.SCENARIOS:
+        draw_snapshots(robot, mt.Trajectory.load(RESULTS / name / "trajectory.npz"), name)
     for page in (ROOT / "README.md", ROOT / "docs" / "scenarios.md"):
         before, rest = page.read_text(encoding="utf-8").split(BEGIN)
         table = (RESULTS / "table.md").read_text(encoding="utf-8")

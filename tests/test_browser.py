@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import io
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from multimodal_to import replay
+from multimodal_to import replay, scenarios
 from multimodal_to.errors import InputError, OutputError
+from multimodal_to.models.terrain import Stairs
+from multimodal_to.ocp.scenario_data import to_json
 from multimodal_to.replay.browser import find_browser, open_browser
 from synthetic import DURATION, LIFT_OFF, take_off
 
@@ -153,3 +156,34 @@ def test_snapshots_are_taken_where_flight_begins_by_default(trajectory):
     assert LIFT_OFF in times
     assert times[0] == 0.0
     assert times[-1] == DURATION
+
+
+def test_ghosts_on_a_step_stand_apart(trajectory):
+    stairs = Stairs(edges=(0.3,), heights=(0.0, 0.1), direction=(-1.0, 0.0))
+    kept = to_json(replace(scenarios.take_off(), surface=stairs))
+    com = trajectory.com_position.copy()
+    com[0] = -0.5 * trajectory.time
+    walking = replace(trajectory, scenario_json=kept, com_position=com)
+    np.testing.assert_allclose(replay.snapshot_times(walking), [0.0, 1.0, DURATION])
+
+
+@needs_browser
+def test_a_replay_plays_in_the_frame_of_a_notebook(ironcub, trajectory, tmp_path):
+    cell = replay.embed(ironcub, trajectory, meshes=False, height=300)
+    (tmp_path / "notebook.html").write_text(
+        f"<!DOCTYPE html><body>{cell._repr_html_()}<script>let replay = {{}};</script></body>", encoding="utf-8"
+    )
+    with open_browser((600, 400)) as browser:
+        browser.open(tmp_path / "notebook.html")
+        inside = "document.querySelector('iframe').contentWindow.eval"
+        start = time.monotonic()
+        while not browser.evaluate(f"{inside}('typeof replay === \"object\" && replay.state.time > 0.1')"):
+            assert time.monotonic() - start < 60.0
+        height = browser.evaluate(f"{inside}('replay.viewer.renderer.domElement.clientHeight')")
+        assert height == 300
+        assert browser.errors == []
+
+
+def test_a_frame_without_height_is_refused(ironcub, trajectory):
+    with pytest.raises(InputError, match="height of the frame is 0"):
+        replay.embed(ironcub, trajectory, meshes=False, height=0)

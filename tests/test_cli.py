@@ -8,21 +8,25 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from multimodal_to import scenario_files, scenarios
+from multimodal_to.cli.showing import _labels
 from multimodal_to.models.terrain import Plane
 from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.trajectory import Trajectory
 from synthetic import take_off as synthetic_take_off
 
 
-def run(*arguments, cwd=None):
+def run(*arguments, cwd=None, columns=200, **environment):
     return subprocess.run(
         [sys.executable, "-m", "multimodal_to", *map(str, arguments)],
-        capture_output=True, text=True, cwd=cwd, timeout=300, check=False, env={**os.environ, "COLUMNS": "200"},
+        capture_output=True, text=True, cwd=cwd, timeout=300, check=False,
+        env={**os.environ, "COLUMNS": str(columns), **environment},
     )  # fmt: skip
 
 
@@ -69,27 +73,67 @@ def test_a_changed_scenario_is_solved_and_kept_in_the_file(tmp_path):
     assert run("show", file).stdout == scenario_files.to_toml(kept)
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        (),
-        ("doctor",),
-        ("solve",),
-        ("reproduce",),
-        ("plot",),
-        ("replay",),
-        ("audit",),
-        ("simulate",),
-        ("list",),
-        ("show",),
-        ("robot",),
-        ("robot", "info"),
-    ],
+COMMANDS = (
+    "list",
+    "show",
+    "doctor",
+    "solve",
+    "reproduce",
+    "plot",
+    "replay",
+    "report",
+    "export",
+    "audit",
+    "simulate",
+    "robot info",
 )
-def test_help_is_short(command):
-    result = run(*command, "--help")
+
+
+def test_help_lists_every_command():
+    names = re.findall(r"^  ([a-z]+)  ", run("--help").stdout, re.MULTILINE)
+    assert names == list(dict.fromkeys(command.split()[0] for command in COMMANDS))
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS, "robot"])
+def test_help_is_short_and_each_command_has_an_example(command):
+    result = run(*command.split(), "--help", columns=80)
     assert result.returncode == 0
     assert len(result.stdout.splitlines()) < 40
+    if command in COMMANDS:
+        assert f"Example: multimodal-to {command}" in " ".join(result.stdout.split())
+
+
+def completions(line, folder):
+    """What the shell offers for the last word of a line."""
+    words = line.split(" ")
+    environment = {"_MULTIMODAL_TO_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+    code = "import sys; sys.argv = ['multimodal-to']; from multimodal_to.cli import main; main()"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder, check=False,
+                            env={**os.environ, **environment}, timeout=60)  # fmt: skip
+    assert result.stderr == ""
+    return result.stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("multimodal-to re", ["reproduce", "replay", "report"]),
+        ("multimodal-to solve ta", ["take-off", "take-off-and-landing"]),
+        ("multimodal-to solve m", ["mine.toml"]),
+        ("multimodal-to doctor s", ["step-up"]),
+        ("multimodal-to show j", ["jump", "jump.npz"]),
+        ("multimodal-to reproduce take-off st", ["step-up"]),
+        ("multimodal-to plot a.npz --figure m", ["momentum", "margins"]),
+        ("multimodal-to export a.npz --to m", ["mat", "mujoco"]),
+        ("multimodal-to robot info i", ["ironcub"]),
+        ("multimodal-to audit a.npz --robot r", ["robots/"]),
+    ],
+)
+def test_the_shell_completes_names_and_files(line, offered, tmp_path):
+    for name in ("mine.toml", "mine.npy", "jump.npz"):
+        (tmp_path / name).touch()
+    (tmp_path / "robots").mkdir()
+    assert completions(line, tmp_path) == offered
 
 
 def test_robot_info_shows_the_tree_and_what_looks_wrong():
@@ -144,7 +188,8 @@ def test_a_bare_motion_is_nothing_to_go_on_with(file):
 
 
 def test_progress_names_iteration_objective_violation_and_time(stopped):
-    assert "iteration    0   objective" in stopped[1].stdout
+    assert "take-off took 94 iterations, by which the time left is guessed" in stopped[1].stdout
+    assert "time left not known yet   iteration    0   objective" in stopped[1].stdout
     assert "largest violation" in stopped[1].stdout
 
 
@@ -167,6 +212,13 @@ def test_all_figures_of_two_files_are_plotted_under_names_of_their_own(file, tmp
     assert result.returncode == 0
     names = sorted(path.stem.removeprefix("both-") for path in tmp_path.glob("*.png"))
     assert names == ["com", "contacts", "forces", "joints", "margins", "momentum", "torques"]
+
+
+def test_files_of_one_scenario_are_told_apart_by_what_differs_in_their_paths():
+    jump, hover = SimpleNamespace(scenario="jump"), SimpleNamespace(scenario="hover")
+    files = [Path(f"results/today/{name}/trajectory.npz") for name in ("a", "b", "hover")]
+    assert _labels(files, [jump, jump, hover]) == ["a/trajectory.npz", "b/trajectory.npz", "hover"]
+    assert _labels(files[:1] * 2, [jump, jump]) == [str(files[0])] * 2
 
 
 def test_report_and_export_read_a_saved_file(file, tmp_path):
@@ -215,6 +267,8 @@ def test_bare_arrays_are_audited_once_their_robot_is_named(file, tmp_path):
             "unknown key 'final_height'; did you mean 'final_com_height'?",
         ),
         (("solve", "take-off", "--set", "knots=few"), "'knots' is 'few'; expected a whole number"),
+        (("show", "takeoff"), "unknown scenario 'takeoff'; did you mean 'take-off'?"),
+        (("show", "none.npz"), "no trajectory file 'none.npz'"),
         (("reproduce", "takeoff"), "unknown scenario 'takeoff'; did you mean 'take-off'?"),
         (("reproduce", "jump", "--published", "none"), "no .npz of a published trajectory in 'none'"),
         (("solve",), "nothing to solve; expected the NAME of a scenario, or --resume FILE"),
@@ -239,6 +293,18 @@ def test_bad_input_ends_in_one_sentence_and_two(tmp_path, arguments, sentence):
     assert result.stderr.count("\n") == 1
     assert sentence in result.stderr
     assert list(tmp_path.rglob("*.npz")) == []
+
+
+@pytest.mark.parametrize("arguments", [("list", "jump"), ("solve", "jump", "--fast"), ("export", "jump.npz"), ("fly",)])
+def test_what_no_command_takes_ends_in_usage_and_two(arguments):
+    result = run(*arguments)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr.startswith("Usage: ")
+
+
+def test_colour_is_for_terminals_only(file):
+    assert "\x1b" not in run("audit", file).stdout
+    assert "\x1b[1;31mFAILS" in run("audit", file, FORCE_COLOR="1", TERM="xterm-256color").stdout
 
 
 def test_a_folder_that_cannot_be_written_is_found_before_the_solve(tmp_path):

@@ -8,10 +8,12 @@ import pytest
 from matplotlib._pylab_helpers import Gcf
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Rectangle
+from matplotlib.text import Text
 
-from multimodal_to import derived, plotting
+from multimodal_to import derived, plotting, scenarios
 from multimodal_to.errors import InputError, OutputError
 from multimodal_to.models.robot import load_robot
+from multimodal_to.ocp.scenario_data import to_json
 from multimodal_to.plotting import style
 from synthetic import DURATION, LIFT_OFF, take_off
 
@@ -65,6 +67,13 @@ def test_each_flight_has_its_own_band_but_one_entry_in_the_legend(robot, traject
     time = trajectory.time
     np.testing.assert_allclose(bands(figure.axes[0]), [(time[2], time[3]), (LIFT_OFF, time[-3])])
     assert [text.get_text() for text in figure.axes[2].get_legend().get_texts()].count("flight") == 1
+
+
+def test_bands_of_several_runs_together_leave_the_data_visible(robot, trajectory):
+    panel = plotting.plot_com(robot, *[trajectory] * 4, labels=list("abcd")).axes[0]
+    bands_of_all = [patch for patch in panel.patches if isinstance(patch, Rectangle)]
+    assert len(bands_of_all) == 4
+    assert sum(band.get_alpha() for band in bands_of_all) <= 0.25
 
 
 def test_a_robot_that_stays_on_the_ground_has_no_band(robot, trajectory):
@@ -148,6 +157,55 @@ def test_every_figure_has_units_and_no_legend_over_its_data(name, robot, traject
         if (legend := axes.get_legend()) is not None:
             box, data = legend.get_window_extent(renderer), axes.get_window_extent(renderer)
             assert box.y0 >= data.y1 - 1.0 or box.y1 <= data.y0 + 1.0
+
+
+@pytest.mark.parametrize("count", [1, 4])
+@pytest.mark.parametrize("name", sorted(plotting.FIGURES))
+def test_no_text_of_a_figure_lies_over_another_or_beyond_its_edge(name, count, robot, trajectory):
+    runs = [replace(trajectory, scenario=f"scenario-{number}") for number in range(count)]
+    labels = [f"results/of-today/{run.scenario}/trajectory.npz" for run in runs]
+    figure = plotting.plot(name, robot, *runs, labels=labels if count > 1 else None)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    boxes = [(text.get_text(), text.get_window_extent(renderer)) for text in drawn_texts(figure)]
+    assert len(boxes) > 20
+    for index, (text, box) in enumerate(boxes):
+        assert -1 <= box.x0 <= box.x1 <= figure.bbox.x1 + 1, text
+        assert -1 <= box.y0 <= box.y1 <= figure.bbox.y1 + 1, text
+        for other, there in boxes[index + 1 :]:
+            apart = box.x1 < there.x0 + 1 or there.x1 < box.x0 + 1 or box.y1 < there.y0 + 1 or there.y1 < box.y0 + 1
+            assert apart, f"'{text}' lies over '{other}'"
+
+
+def drawn_texts(figure) -> list[Text]:
+    """Texts of a figure without the labels of ticks that are not in use or outside the range of their axis."""
+    beyond = set()
+    for axes in figure.get_axes():
+        for axis, limits in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+            low, high = sorted(limits)
+            low, high = low - 1e-9 * abs(low) - 1e-15, high + 1e-9 * abs(high) + 1e-15
+            used = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+            for tick in {*axis.majorTicks, *axis.minorTicks, *used}:
+                if tick not in used or not low <= tick.get_loc() <= high:
+                    beyond |= {tick.label1, tick.label2}
+    texts = figure.findobj(lambda thing: isinstance(thing, Text) and thing.get_visible() and thing.get_text().strip())
+    return [text for text in texts if text not in beyond]
+
+
+def test_the_bounds_of_the_scenario_are_dashed_beside_the_products(robot, trajectory):
+    scenario = scenarios.take_off()
+    products = plotting.plot_margins(robot, replace(trajectory, scenario_json=to_json(scenario))).axes[0]
+    dashed = {line.get_ydata()[0] for line in products.lines if line.get_color() == style.LIMIT["color"]}
+    assert dashed == {scenario.complementarity_max, np.sqrt(2.0) * scenario.sliding_max}
+
+
+@pytest.mark.parametrize("name", ["joints", "torques"])
+def test_every_column_of_joints_has_a_time_axis(name, robot, trajectory):
+    figure = plotting.plot(name, robot, trajectory)
+    columns = {round(axes.get_position().x0, 2) for axes in figure.axes if axes.axison}
+    timed = {round(axes.get_position().x0, 2) for axes in figure.axes if axes.get_xlabel() == "time [s]"}
+    assert timed == columns
 
 
 def all_texts(figure) -> list:

@@ -18,6 +18,7 @@ from multimodal_to.models.terrain import Stairs
 from multimodal_to.ocp.scenario_data import to_json
 from multimodal_to.replay import effects, scene
 from multimodal_to.replay import page as pages
+from multimodal_to.terrain_mesh import CELL
 from synthetic import DURATION, KNOTS, take_off
 
 quaternion_matrix = scene.meshcat.transformations.quaternion_matrix
@@ -227,6 +228,19 @@ def test_the_sphere_follows_the_com(trajectory, stage):
         np.testing.assert_allclose(stage.value("/meshcat/com", "position", knot), trajectory.com_position[:, knot])
 
 
+def test_the_way_of_the_com_is_a_thin_tube_about_it_that_shines_through_the_robot(robot, trajectory, stage, tmp_path):
+    (tube,) = stage.objects[stage.find("com_trace/outside")]["geometries"]
+    points, way = vertices(tube), trajectory.com_position.T
+    away = np.linalg.norm(np.cross(points - way[0], way[-1] - way[0]), axis=1) / np.linalg.norm(way[-1] - way[0])
+    np.testing.assert_allclose(away, effects._TRACE_RADIUS, atol=1e-6)  # this CoM moves along a line
+    assert (points[:, 2].min(), points[:, 2].max()) == pytest.approx((way[0, 2], way[-1, 2]), abs=1e-4)
+    (material,) = stage.objects[stage.find("com_trace/within")]["materials"]
+    assert material["depthTest"] is False
+    resting = replace(trajectory, com_position=np.repeat(trajectory.com_position[:, :1], KNOTS + 1, axis=1))
+    page = replay.write_html(robot, resting, tmp_path / "resting.html", meshes=False)
+    assert not any("com_trace" in path for path in Stage(page.read_text(encoding="utf-8")).objects)
+
+
 def test_the_drawn_robot_looks_where_its_toes_point_and_carries_the_jets_on_its_back(robot, trajectory, stage):
     toes_forward = frame_poses(robot, trajectory, "l_ankle_2")[0][:3, 0]
     knot_poses = {name: frame_poses(robot, trajectory, name)[0] for name in ("head", "chest", "chest_l_jet_turbine")}
@@ -279,7 +293,18 @@ def test_ground_that_is_not_flat_is_drawn_as_a_patch_on_its_surface(robot, traje
     path = replay.write_html(robot, replace(trajectory, scenario_json=kept), tmp_path / "stairs.html")
     stage = Stage(path.read_text(encoding="utf-8"))
     assert not [path for path in stage.objects if path.endswith(("ground/disc", "ground/grid"))]
-    (terrain,) = (content for path, content in stage.objects.items() if path.endswith("ground/terrain"))
-    data = terrain["geometries"][0]["data"]["attributes"]["position"]["array"]
-    heights = np.frombuffer(data.data, dtype=np.float32).reshape(-1, 3)[:, 2]
-    assert (heights.min(), heights.max()) == pytest.approx((0.0, 0.1), abs=1e-6)
+    (treads,), (risers,) = (
+        stage.objects[stage.find(f"ground/{name}")]["geometries"] for name in ("terrain", "steep_terrain")
+    )
+    heights = vertices(treads)[:, 2]
+    assert np.unique(heights.round(6)) == pytest.approx([0.0, 0.1], abs=1e-6)
+    assert np.ptp(vertices(risers)[:, 0]) < 2.1 * CELL
+
+
+@pytest.mark.parametrize(("heights", "side"), [((0.0, 0.1), 1.0), ((0.1, 0.0), -1.0), ((0.0, 0.0), -1.0)])
+def test_the_camera_stands_where_the_ground_hides_no_step(robot, trajectory, tmp_path, heights, side):
+    stairs = Stairs(edges=(0.3,), heights=heights, direction=(-1.0, 0.0))
+    kept = to_json(replace(scenarios.take_off(), surface=stairs))
+    path = replay.write_html(robot, replace(trajectory, scenario_json=kept), tmp_path / "p.html", meshes=False)
+    x, _, _ = Stage(path.read_text(encoding="utf-8")).value("/Cameras/default/rotated/<object>", "position", 0)
+    assert x * side > 0.5

@@ -7,6 +7,8 @@ import pytest
 
 from multimodal_to import scenarios
 from multimodal_to.audit import audit
+from multimodal_to.ocp.record import Kind
+from multimodal_to.ocp.record import to_json as record_json
 from multimodal_to.ocp.scenario_data import to_json
 from multimodal_to.plotting import FIGURES
 from multimodal_to.replay.browser import find_browser, open_browser
@@ -34,10 +36,30 @@ def test_the_report_says_what_the_audit_says(page, ironcub, trajectory):
     assert 'terminal = "hover"' in text
 
 
+def test_the_report_says_how_it_was_solved(ironcub, trajectory, tmp_path):
+    record = record_json(
+        kind=Kind.ANSWER, status="optimal", message="Solve_Succeeded", iterations=94, solve_time=34.25, objective=2.7e6,
+        costs={"thrust": 1.5e6, "com_velocity": 1.2e6}, violations={"friction": 2e-9, "sliding": float("nan")},
+        versions={"casadi": "9.9.9"}, threads={"blas": 1, "cores": None}, linear_solver="mumps",
+    )  # fmt: skip
+    solved = replace(trajectory, solve_json=record)
+    text = write_report(ironcub, solved, tmp_path / "r.html", meshes=False).read_text(encoding="utf-8")
+    assert "<th>solver</th><td>optimal · Solve_Succeeded, 34.2 s</td>" in text
+    rows = dict(re.findall(r"<tr><th>([^<]+)</th><td>([^<]+)</td></tr>", text.split("<h2>Solve</h2>")[1]))
+    assert rows == {
+        "status": "optimal · Solve_Succeeded", "iterations": "94", "time in the solver": "34.2 s",
+        "objective": "2.7e+06", "largest costs": "thrust 1.5e+06, com_velocity 1.2e+06",
+        "largest violation": "2.0e-09 (friction)", "linear solver": "mumps", "threads": "blas 1",
+        "solved with": "casadi 9.9.9",
+    }  # fmt: skip
+
+
 def test_a_file_without_a_scenario_has_a_report_too(ironcub, tmp_path):
     path = write_report(ironcub, take_off(ironcub), tmp_path / "report.html", meshes=False)
     text = path.read_text(encoding="utf-8")
     assert "The file keeps no scenario" in text
+    assert "The file does not say how it was solved" in text
+    assert "<th>solver</th><td>not known</td>" in text
     assert "<h1>take-off &amp; hover · ironcub</h1>" in text
     assert not re.search(r'(src|href)="(?!data:)', text.split("<script>")[0])
 

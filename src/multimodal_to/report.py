@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from importlib import metadata, resources
 from pathlib import Path
 from string import Template
+from typing import Any
 
 from multimodal_to.audit import Audit, audit
 from multimodal_to.findings import Finding
@@ -23,7 +24,9 @@ from multimodal_to.trajectory import Trajectory
 from multimodal_to.writing import write_text
 
 PACKAGES = ("multimodal-to", "casadi", "numpy")
-"""Whose versions the report names."""
+"""Whose versions the report names as those that drew it."""
+
+_COSTLIEST = 6  # so many costs are named
 
 _CAPTIONS: Mapping[str, str] = {
     "forces": "Throttle, thrust and vertical contact force",
@@ -51,6 +54,7 @@ def write_report(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[s
         title=html.escape(f"{title} · {trajectory.robot}"),
         summary=_summary(report),
         facts="".join(_row(("th", name), ("td", text)) for name, text in _facts(robot, trajectory, report).items()),
+        solve=_solve(trajectory),
         player=player(robot, trajectory, meshes=meshes),
         figures="\n".join(_figure(name, robot, trajectory, report) for name in FIGURES),
         findings="\n".join(_findings(report.findings)),
@@ -68,14 +72,55 @@ def _summary(report: Audit) -> str:
 
 def _facts(robot: Robot, trajectory: Trajectory, report: Audit) -> dict[str, str]:
     versions = [f"{name} {metadata.version(name)}" for name in PACKAGES]
+    status, took = (_solve_facts(trajectory.solve_record())[name] for name in ("status", "time in the solver"))
     return {
         "scenario": trajectory.scenario,
         "robot": f"{robot.name}: {len(robot.joint_names)} joints, {robot.mass:.2f} kg, "
         f"{len(robot.contacts)} contact points, {len(robot.jets)} jets",
         "time": f"{report.duration:.2f} s in {trajectory.knots} intervals; longest flight {report.airborne:.2f} s",
         "thrust at the end": f"{100 * report.final_thrust_over_weight:.2f} % of the weight, vertically",
-        "versions": ", ".join([*versions, f"Python {platform.python_version()}"]),
+        "solver": ", ".join(filter(None, (status, took))) or "not known",
+        "report made with": ", ".join([*versions, f"Python {platform.python_version()}"]),
     }
+
+
+def _solve(trajectory: Trajectory) -> str:
+    """Return how the trajectory was solved, as far as its file says."""
+    record = trajectory.solve_record()
+    if not record:
+        return '<p class="quiet">The file does not say how it was solved.</p>'
+    texts = {name: text for name, text in _solve_facts(record).items() if text}
+    return f'<table class="facts">{"".join(_row(("th", name), ("td", text)) for name, text in texts.items())}</table>'
+
+
+def _solve_facts(record: Mapping[str, Any]) -> dict[str, str]:
+    """Return the facts of a solve's record in words; those that it lacks are empty."""
+    violations, costs, threads, versions = (
+        part if isinstance(part := record.get(name), dict) else {}
+        for name in ("violations", "costs", "threads", "versions")
+    )
+    worst = sorted(_numbers(violations).items(), key=lambda entry: -entry[1])[:1]
+    costliest = sorted(_numbers(costs).items(), key=lambda entry: -entry[1])[:_COSTLIEST]
+    return {
+        "status": " · ".join(str(record[name]) for name in ("status", "message") if record.get(name)),
+        "kept": "the best iterate of a solve that had not ended" if record.get("kind") == "checkpoint" else "",
+        "iterations": str(record.get("iterations", "")),
+        "time in the solver": _measured(record, "solve_time", ".1f", " s"),
+        "objective": _measured(record, "objective", ".6g", ""),
+        "largest costs": ", ".join(f"{name} {value:.3g}" for name, value in costliest),
+        "largest violation": ", ".join(f"{value:.1e} ({name})" for name, value in worst),
+        "linear solver": str(record.get("linear_solver", "")),
+        "threads": ", ".join(f"{name} {count}" for name, count in threads.items() if count is not None),
+        "solved with": ", ".join(f"{name} {version}" for name, version in versions.items()),
+    }
+
+
+def _numbers(table: Mapping[str, Any]) -> dict[str, float]:
+    return {name: float(value) for name, value in table.items() if isinstance(value, int | float)}
+
+
+def _measured(record: Mapping[str, Any], name: str, form: str, unit: str) -> str:
+    return "".join(f"{value:{form}}{unit}" for value in _numbers({name: record.get(name)}).values())
 
 
 def _row(*cells: tuple[str, str]) -> str:

@@ -13,6 +13,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.text import Text
 
 # They register their commands, in this order.
 # isort: off
@@ -31,7 +32,7 @@ def main() -> None:
     try:
         app()
     except MultimodalError as error:
-        Console(stderr=True, highlight=False).print(f"error: {error}", markup=False, soft_wrap=True)
+        _say("error", "bold red", str(error))
         sys.exit(2)
 
 
@@ -52,4 +53,9 @@ def _options(
 
 
 def _show_warning(message: Warning | str, *_: object) -> None:
-    Console(stderr=True, highlight=False).print(f"warning: {message}", markup=False, soft_wrap=True)
+    _say("warning", "yellow", str(message))
+
+
+def _say(what: str, style: str, sentence: str) -> None:
+    """Print to the standard error, with colour where it is a terminal."""
+    Console(stderr=True, highlight=False).print(Text.assemble((f"{what}: ", style), sentence), soft_wrap=True)

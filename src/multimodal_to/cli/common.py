@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 
 from multimodal_to.audit import Audit
+from multimodal_to.cli.completion import robots_or_folders, scenarios_or_files
 from multimodal_to.errors import InputError, OutputError, TrajectoryError, listed
 from multimodal_to.importing import import_arrays
 from multimodal_to.models.robot import Robot, load_robot
@@ -29,16 +30,23 @@ app = typer.Typer(
 out = Console(highlight=False, markup=False, emoji=False)
 
 File = Annotated[Path, typer.Argument(help="Trajectory file, as `solve` writes it.")]
-ScenarioName = Annotated[str, typer.Argument(help="Scenario, as `list` shows it, or a TOML file of one.")]
+ScenarioName = Annotated[
+    str, typer.Argument(help="Scenario, as `list` shows it, or a TOML file of one.", autocompletion=scenarios_or_files)
+]
 OptionalName = Annotated[
     str | None,
-    typer.Argument(metavar="NAME", help="Scenario, as `list` shows it, or a TOML file of one; needless with --resume."),
-]
+    typer.Argument(
+        metavar="NAME", help="Scenario, as `list` shows it, or a TOML file of one; needless with --resume.",
+        show_default=False, autocompletion=scenarios_or_files,
+    ),
+]  # fmt: skip
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in --set final_com_height=0.8; repeatable."),
 ]
-RobotOption = Annotated[str, typer.Option("--robot", help="Bundled robot by name, or a robot's folder.")]
+RobotOption = Annotated[
+    str, typer.Option("--robot", help="Bundled robot by name, or a robot's folder.", autocompletion=robots_or_folders)
+]
 
 
 def chosen(name: str, settings: list[str] | None) -> Scenario:

@@ -11,10 +11,12 @@ from typing import Annotated, Any
 
 import typer
 from rich.table import Column, Table
+from rich.text import Text
 
 from multimodal_to.adam.inspection import describe
 from multimodal_to.audit import Audit, audit
 from multimodal_to.cli.common import File, RobotOption, app, described, loaded, out, writable
+from multimodal_to.cli.completion import robots_or_urdfs
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import load_robot
 
@@ -43,7 +45,7 @@ def audit_file(
     narrow = [Column(title, no_wrap=True) for title in ("property", "worst", "limit", "unit", "knot")]
     table = Table(*narrow, "where", Column(no_wrap=True), box=None, pad_edge=False)
     for finding in report.findings:
-        verdict = "ok" if finding.holds else "FAILS"
+        verdict = Text("ok", style="green") if finding.holds else Text("FAILS", style="bold red")
         table.add_row(finding.name, f"{finding.worst:.1e}", f"{finding.limit:.2g}", finding.unit, str(finding.knot),
                       finding.body, verdict)  # fmt: skip
     out.print(table)
@@ -124,7 +126,12 @@ def simulate(
 
 @robot_app.command("info")
 def robot_info(
-    path: Annotated[str, typer.Argument(help="URDF file, a robot's folder, or the name of a bundled robot.")],
+    path: Annotated[
+        str,
+        typer.Argument(
+            help="URDF file, a robot's folder, or the name of a bundled robot.", autocompletion=robots_or_urdfs
+        ),
+    ],
 ) -> None:
     """Show a robot's tree, masses and frames, what was merged or locked, and what looks wrong.
 

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from multimodal_to.cli.expectation import Expectation, Rest
 from multimodal_to.ocp import Iterate
 
 _LINE_EVERY = 5.0  # [s] between progress lines where the output is no terminal
@@ -17,16 +18,19 @@ _LINE_EVERY = 5.0  # [s] between progress lines where the output is no terminal
 class Progress:
     """Shows where a solve stands, and ends it cleanly on Ctrl-C; a second one, also later, ends the process at once."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, expectation: Expectation | None = None) -> None:
         self._console = console
+        self._rest = None if expectation is None else Rest(expectation)
         self._live = Live(console=console, transient=True, refresh_per_second=4)
         self.interrupted = False
         self._printed = -_LINE_EVERY
 
     def __call__(self, iterate: Iterate) -> bool:
         """Show an iterate; return whether Ctrl-C was pressed."""
+        rest = "" if self._rest is None else f"{self._rest.after(iterate.iteration, iterate.elapsed)}   "
         line = (
-            f"{iterate.elapsed:5.1f} s   iteration {iterate.iteration:4d}   objective {iterate.objective:11.5g}   "
+            f"{iterate.elapsed:5.1f} s   {rest}iteration {iterate.iteration:4d}   "
+            f"objective {iterate.objective:11.5g}   "
             f"largest violation {iterate.violation:.1e} {iterate.unit} ({iterate.worst})"
         )
         if self._console.is_terminal:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from itertools import takewhile
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from multimodal_to.cli.common import File, RobotOption, app, loaded, option_numbers, out, writable, writable_file
+from multimodal_to.cli.completion import exports, figures
 from multimodal_to.errors import InputError, OutputError, unknown
 from multimodal_to.export import EXPORTS
 from multimodal_to.models.robot import load_robot
@@ -19,7 +21,10 @@ from multimodal_to.trajectory import Trajectory
 def plot(
     files: Annotated[list[Path], typer.Argument(help="Trajectory files; several are drawn in one figure.")],
     figure: Annotated[
-        str, typer.Option(help="forces, com, momentum, joints, torques, contacts, margins, or all of them.")
+        str,
+        typer.Option(
+            help="forces, com, momentum, joints, torques, contacts, margins, or all of them.", autocompletion=figures
+        ),
     ] = "forces",
     output: Annotated[
         Path | None,
@@ -50,10 +55,12 @@ def plot(
 
 
 def _labels(files: list[Path], trajectories: list[Trajectory]) -> list[str]:
-    """Return a short name for each file: its scenario, or its path where two are of one scenario."""
+    """Return a short name for each file: its scenario, or what tells its path from those of others of its scenario."""
     scenarios = [trajectory.scenario for trajectory in trajectories]
+    paths = [file.parts for file, scenario in zip(files, scenarios, strict=True) if scenarios.count(scenario) > 1]
+    same_start = sum(1 for _ in takewhile(lambda parts: len(set(parts)) == 1, zip(*paths, strict=False)))
     return [
-        scenario if scenarios.count(scenario) == 1 else str(file)
+        scenario if scenarios.count(scenario) == 1 else "/".join(file.parts[same_start:]) or str(file)
         for scenario, file in zip(scenarios, files, strict=True)
     ]
 
@@ -124,7 +131,7 @@ def report_file(
 @app.command("export")
 def export_file(
     file: File,
-    to: Annotated[str, typer.Option("--to", help="csv, mat, mujoco or pinocchio.")],
+    to: Annotated[str, typer.Option("--to", help="csv, mat, mujoco or pinocchio.", autocompletion=exports)],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write. [FILE.csv and so on]")] = None,
     robot: RobotOption = "",
 ) -> None:

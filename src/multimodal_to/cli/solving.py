@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Column, Table
 
 from multimodal_to.audit import Audit, audit
+from multimodal_to.cli import completion
 from multimodal_to.cli.common import (
     OptionalName,
     RobotOption,
@@ -24,6 +25,7 @@ from multimodal_to.cli.common import (
     out,
     writable,
 )
+from multimodal_to.cli.expectation import expect
 from multimodal_to.cli.progress import Progress
 from multimodal_to.cli.tasks import free_checkpoint, given
 from multimodal_to.doctor import Diagnosis, Severity, refusal
@@ -43,7 +45,10 @@ _MISSES_SHOWN = 5
 
 @app.command("list")
 def list_scenarios() -> None:
-    """List the bundled scenarios with their numbers."""
+    """List the bundled scenarios with their numbers.
+
+    Example: multimodal-to list
+    """
     table = Table(Column(no_wrap=True), Column(), box=None, show_header=False, pad_edge=False)
     for make in SCENARIOS.values():
         scenario = make()
@@ -63,7 +68,16 @@ def _numbers(scenario: Scenario) -> str:
 
 
 @app.command()
-def show(name: ScenarioName, settings: Settings = None) -> None:
+def show(
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="Scenario, as `list` shows it, a TOML file of one, or a trajectory file.",
+            autocompletion=completion.scenarios_or_trajectories,
+        ),
+    ],
+    settings: Settings = None,
+) -> None:
     """Print a scenario as TOML, complete; also the one that a trajectory file was solved from.
 
     Example: multimodal-to show take-off > my_task.toml
@@ -126,7 +140,12 @@ def solve(
         Path | None, typer.Option("--output", "-o", help="Folder for the results; made if missing. [results/NAME]")
     ] = None,
     robot: Annotated[
-        str, typer.Option("--robot", help="Bundled robot by name, or a robot's folder. [ironcub, or the file's]")
+        str,
+        typer.Option(
+            "--robot",
+            help="Bundled robot by name, or a robot's folder. [ironcub, or the file's]",
+            autocompletion=completion.robots_or_folders,
+        ),
     ] = "",
     max_iterations: Annotated[int, typer.Option(help="Give up after so many iterations.")] = 1000,
     time_limit: Annotated[float, typer.Option(help="Give up after so many seconds in the solver.")] = 3600.0,
@@ -168,8 +187,11 @@ def solve(
         f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s",
         soft_wrap=True,
     )
+    expectation = expect(scenario) if task.start is None else None
+    if expectation is not None:
+        console.print(f"{expectation}", soft_wrap=True)
     kept = free_checkpoint(folder, resume, console) if checkpoint else None
-    with Progress(console) as progress:
+    with Progress(console, expectation) as progress:
         solution = run_solver(problem, solver, progress, start=task.start, checkpoint=kept)
     written = [solution.trajectory.save(folder / "trajectory.npz")]
     if kept is not None:
@@ -232,7 +254,9 @@ def _summarise(console: Console, solution: Solution, report: Audit) -> None:
 
 @app.command("reproduce")
 def reproduce_scenarios(
-    names: Annotated[list[str] | None, typer.Argument(help="Bundled scenarios; without, all.")] = None,
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Bundled scenarios; without, all.", autocompletion=completion.scenarios)
+    ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; made if missing.")] = Path(
         "results"
     ),
@@ -259,7 +283,7 @@ def reproduce_scenarios(
     runs = []
     for scenario, folder in zip(scenarios, folders, strict=True):
         out.print(f"{scenario.name}: {scenario.title}")
-        with Progress(out) as progress:
+        with Progress(out, expect(scenario)) as progress:
             run = reproduce(robot, scenario, progress=progress)
         write_run(run, folder)
         runs.append(run)

@@ -84,7 +84,7 @@ def _cells(
         axes.set_title(_cell_title(names[index], ends, whole_range), fontsize=SMALL)
         draw_flight([axes], runs)
         finish([axes], 0.0 if whole_range else 1.0)
-        _tick(axes, bottom=index // _COLUMNS == rows - 1)
+        _tick(axes, bottom=index + _COLUMNS >= len(names))
     figure.supylabel(unit, fontsize="medium")
 
 

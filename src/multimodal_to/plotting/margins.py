@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,6 +21,7 @@ from multimodal_to.plotting.style import (
     SMALL,
     Run,
     draw_flight,
+    draw_limits,
     legend_above,
     new_figure,
     runs_of,
@@ -35,8 +37,10 @@ def plot_margins(
 ) -> Figure:
     """Plot the largest height × force and slip × force over time [N m], and the audit's worst over their limits [1].
 
-    Both axes are logarithmic and end at 1e-8 and 1e-6; a property that has nothing to show, as a penetration of less
-    than zero, has no bar. A bar that passes 1 fails. `audits` are those to show; by default each run is audited.
+    Dashed are the scenario's bounds on the products; that on slips holds along each of two tangents, so that ‖slip‖
+    may be √2 as much. Both axes are logarithmic and end at 1e-8 and 1e-6; a property that has nothing to show, as a
+    penetration of less than zero, has no bar. A bar that passes 1 fails. `audits` are those to show; by default each
+    run is audited.
 
     Raises:
         InputError: the trajectories are for different robots, or too many.
@@ -63,6 +67,9 @@ def _draw_products(axes: Axes, runs: Sequence[Run]) -> None:
                 run.time, np.maximum(largest, _PRODUCT_FLOOR), color=colour, linestyle=run.style,
                 label=label if number == 0 else None,
             )  # fmt: skip
+    bounds = [bound for scenario in map(stored, (run.trajectory for run in runs)) if scenario is not None
+              for bound in (scenario.complementarity_max, math.sqrt(2.0) * scenario.sliding_max)]  # fmt: skip
+    draw_limits(axes, set(bounds), "bounds")
     axes.set_ylim(_PRODUCT_FLOOR, max(1e-3, 3.0 * axes.get_ylim()[1]))
     axes.set_ylabel("largest product [N m]")
     axes.set_xlabel("time [s]")
@@ -90,7 +97,7 @@ def _draw_findings(axes: Axes, runs: Sequence[Run], reports: Sequence[Audit]) ->
     axes.set_xlim(_FLOOR, 10.0 * highest)
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.axvline(1.0, **LIMIT)
-    order = f"; from the top: {', '.join(run.label for run in runs)}" if len(runs) > 1 else ""
+    order = "; from the top in the order of the legend" if len(runs) > 1 else ""
     axes.set_xlabel(f"worst over limit; a bar that passes 1 fails{order}", fontsize=SMALL)
     axes.grid(axis="x", alpha=0.3)
 
@@ -98,7 +105,8 @@ def _draw_findings(axes: Axes, runs: Sequence[Run], reports: Sequence[Audit]) ->
 def _properties(reports: Sequence[Audit]) -> dict[str, str]:
     """Return the properties that any of the audits has, with what stands beside their bars."""
     findings = {finding.name: finding for report in reports for finding in report.findings}
-    return {name: f"{name} / {finding.limit:.3g} {finding.unit}" for name, finding in findings.items()}
+    units = {name: "" if finding.unit == "1" else f" {finding.unit}" for name, finding in findings.items()}
+    return {name: f"{name} / {finding.limit:.3g}{units[name]}" for name, finding in findings.items()}
 
 
 def _share(finding: Finding) -> float:

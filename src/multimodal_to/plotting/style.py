@@ -28,6 +28,7 @@ FLIGHT: dict[str, Any] = {"facecolor": "#d62728", "alpha": 0.12, "linewidth": 0.
 LIMIT: dict[str, Any] = {"color": "0.35", "linestyle": (0, (6, 4)), "linewidth": 0.8}
 SMALL = "small"  # text of legends and ticks
 _LEGEND_ROWS = 2
+_LETTERS_PER_INCH, _SAMPLE = 10, 7  # of text of medium size, and of the line before it in a legend
 _DPI = 150
 
 
@@ -69,11 +70,14 @@ def runs_of(robot: Robot, trajectories: Sequence[Trajectory], labels: Sequence[s
 def new_figure(runs: Sequence[Run], what: str, size: tuple[float, float]) -> Figure:
     """Return an empty figure with a title; several runs are told apart by line style, in a legend below."""
     figure = Figure(figsize=size, layout="constrained")
-    title = " and ".join(dict.fromkeys(run.trajectory.scenario for run in runs))
+    names = list(dict.fromkeys(run.trajectory.scenario for run in runs))
+    title = names[0] if len(names) == 1 else f"{len(names)} motions"  # which the legend names
     figure.suptitle(f"{title} · {runs[0].trajectory.robot}: {what}")
     if len(runs) > 1:
         handles = [Line2D([], [], color="0.2", linestyle=run.style) for run in runs]
-        figure.legend(handles, [run.label for run in runs], loc="outside lower center", ncols=len(runs), frameon=False)
+        longest = max(len(run.label) for run in runs)
+        columns = int(min(len(runs), max(1, size[0] * _LETTERS_PER_INCH // (longest + _SAMPLE))))
+        figure.legend(handles, [run.label for run in runs], loc="outside lower center", ncols=columns, frameon=False)
     return figure
 
 
@@ -98,9 +102,10 @@ def draw_limits(axes: Axes, values: Iterable[float], label: str | None) -> None:
 def draw_flight(all_axes: Iterable[Axes], runs: Sequence[Run], labelled: Axes | None = None) -> None:
     """Draw a translucent red band over the flight of every run, with one entry in the legend of one of the axes."""
     phases = [phase for run in runs for phase in flight_phases(run.trajectory)]
+    look = FLIGHT | {"alpha": FLIGHT["alpha"] * min(1.0, 2.0 / len(runs))}  # bands that lie over each other add up
     for axes in all_axes:
         for index, (start, end) in enumerate(phases):
-            axes.axvspan(start, end, label="flight" if axes is labelled and index == 0 else None, **FLIGHT)
+            axes.axvspan(start, end, label="flight" if axes is labelled and index == 0 else None, **look)
 
 
 def finish(all_axes: Iterable[Axes], least_span: float = 0.0) -> None:

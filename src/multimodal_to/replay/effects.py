@@ -22,13 +22,16 @@ SMALLEST_FORCE = 1.0
 
 _NOZZLE_RADIUS = 0.033  # of the flame of the strongest jet [m]
 _FULL_WIDTH_LENGTH = 0.08  # arrows and flames shorter than this are also thinner [m]
-_LAYERS = (  # of a flame, inside out: colour, width and length of the whole, opacity at full thrust
-    ("core", 0xFFF6DC, 0.50, 0.45, 0.95),
-    ("middle", 0xFFB545, 0.78, 0.72, 0.60),
-    ("plume", 0xF06A12, 1.00, 1.00, 0.36),
+_LAYERS = (  # of a flame, each drawn over those before: colour, width and length of the whole, opacity at full thrust
+    ("plume", 0xF06A12, 1.00, 1.00, 0.42),
+    ("middle", 0xFFA935, 0.74, 0.74, 0.60),
+    ("core", 0xFFF6DC, 0.46, 0.46, 0.85),
 )
 _FAINTEST = 0.25  # opacity of a flame almost without thrust, as a share of that at full thrust
 _COM_COLOUR = 0x2B6CE0
+_TRACE_RADIUS = 0.003  # of the way of the CoM [m]
+_TRACE_STEP = 0.002  # points of it that are nearer than this to the one before are left out [m]
+_TRACE_WITHIN = 0.35  # opacity of its part that is inside the robot
 
 
 def draw_flames(
@@ -86,9 +89,33 @@ def draw_com(scene: Scene, trajectory: Trajectory) -> None:
 
 
 def draw_com_trace(scene: Scene, trajectory: Trajectory) -> None:
-    """Draw the way of the CoM as a line."""
-    way = shapes.Line(shapes.PointsGeometry(trajectory.com_position), shapes.LineBasicMaterial(color=_COM_COLOUR))
-    scene.add("com_trace", way, None, np.eye(4))
+    """Draw the way of the CoM as a thin tube, which shines through the robot; nothing where the CoM stays."""
+    points = [trajectory.com_position[:, 0]]
+    for point in trajectory.com_position.T[1:]:
+        if np.linalg.norm(point - points[-1]) > _TRACE_STEP:
+            points.append(point)
+    if len(points) == 1:
+        return
+    tube = _tube(np.array(points), _TRACE_RADIUS)
+    within = shapes.MeshBasicMaterial(color=_COM_COLOUR, opacity=_TRACE_WITHIN, transparent=True, depthTest=False)
+    scene.add("com_trace/within", tube, within, np.eye(4), shadow=False)
+    scene.add("com_trace/outside", tube, shapes.MeshBasicMaterial(color=_COM_COLOUR), np.eye(4), shadow=False)
+
+
+def _tube(points: Array, radius: float, sides: int = 6) -> SmoothMesh:
+    """Return one prism about each segment between points (n, 3), no two of which in a row coincide."""
+    along = np.diff(points, axis=0) / np.linalg.norm(np.diff(points, axis=0), axis=1)[:, None]
+    aside = np.cross(along, np.where(np.abs(along[:, 2:]) < 0.9, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]))
+    aside /= np.linalg.norm(aside, axis=1)[:, None]
+    angles = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)[:, None]
+    normals = np.cos(angles) * aside[:, None] + np.sin(angles) * np.cross(along, aside)[:, None]  # (n - 1, sides, 3)
+    rings = np.concatenate([points[:-1, None] + radius * normals, points[1:, None] + radius * normals], axis=1)
+    here, beside = np.arange(sides), np.roll(np.arange(sides), -1)
+    prism = np.vstack(
+        [np.column_stack([here, beside, beside + sides]), np.column_stack([here, beside + sides, here + sides])]
+    )
+    faces = (2 * sides * np.arange(len(along))[:, None, None] + prism).reshape(-1, 3)
+    return SmoothMesh(rings.reshape(-1, 3), faces, np.concatenate([normals, normals], axis=1).reshape(-1, 3))
 
 
 def _plume(radius: float, length: float, rings: int = 14, sides: int = 24) -> SmoothMesh:

@@ -11,7 +11,7 @@ import numpy as np
 from multimodal_to.derived import frame_poses
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
-from multimodal_to.models.terrain import FlatGround, Surface
+from multimodal_to.models.terrain import FlatGround, Surface, heights_below
 from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.replay.bodies import draw_links, draw_visuals, drawn, faded, link_paths, link_poses
 from multimodal_to.replay.effects import draw_com, draw_com_trace, draw_contact_forces, draw_flames
@@ -25,8 +25,10 @@ FOLLOW_FROM = 0.6
 """The camera follows the CoM along the ground in motions that go farther than this [m]."""
 
 _HALF_LEFT = np.array([-0.72, -0.66, 0.22])  # where the camera is, seen from a robot that faces −x
+_BEHIND_LEFT = np.array([0.45, -0.85, 0.30])  # where it is if the ground, seen from there, would hide its steps
 _FROM_THE_SIDE = 0.14  # how high the camera of a still scene is, per metre of distance
 _BAR = 0.12  # room below the robot for the buttons of the page, per metre of its height
+_LABEL = 0.12  # room for the labels below the ghosts [m]
 _STILL_ZOOM = 4.0  # from farther off, so that ghosts look alike
 _CLOCK = 0.01  # what the clock of a page shows [s]: a time so near to start or end means it
 _GAP = 0.25  # between the ghosts of a motion that stays in its place, per width of the robot
@@ -58,8 +60,10 @@ def draw_motion(
     follow = bool(np.linalg.norm(span) > FOLLOW_FROM)
     low, high = _extent(robot, trajectory, look.visuals, com - com[0] if follow else np.zeros_like(com))
     low[2] = min(low[2], 0.0) - _BAR * (high[2] - low[2])
-    view = _view(low, high, _HALF_LEFT)
-    draw_stage(scene, view, _surface(trajectory), reach=float(span.max()))
+    surface = surface_of(trajectory)
+    direction = _BEHIND_LEFT if _rises(surface, com.mean(axis=0), _HALF_LEFT) else _HALF_LEFT
+    view = _view(np.array([[low, high]]), direction)
+    draw_stage(scene, view, surface, reach=float(span.max()))
 
     paths = link_paths(robot, look, "robot")
     draw_links(scene, paths, link_poses(robot, trajectory, paths))
@@ -91,14 +95,14 @@ def draw_still(
     if instants.size == 0 or (np.diff(instants) <= 0.0).any():
         raise InputError(f"the times of the snapshots are {instants.tolist()}; expected times that increase [s]")
     ghosts = _frozen(trajectory, instants)
-    surface = _surface(trajectory)
+    surface = surface_of(trajectory)
     direction, offsets, apart = _layout(robot, ghosts, look.visuals, level=isinstance(surface, FlatGround))
-    corners = [
+    boxes = [
         np.array(_extent(robot, ghost, look.visuals, np.zeros((2, 3)))) + offset
         for ghost, offset in zip(ghosts, offsets, strict=True)
     ]
-    low, high = np.min([pair[0] for pair in corners], axis=0), np.max([pair[1] for pair in corners], axis=0)
-    view = _view(low, high, direction, aspect=aspect, zoom=_STILL_ZOOM)
+    boxes[0][0, 2] = min(boxes[0][0, 2], 0.0) - _LABEL
+    view = _view(np.array(boxes), direction, aspect=aspect, zoom=_STILL_ZOOM)
     scene = Scene(visualizer=visualizer, time=np.zeros(1))
     draw_stage(scene, view, surface)
     bodies = {visual: drawn(visual) for visual in look.visuals}
@@ -120,10 +124,17 @@ def draw_still(
     return Picture(home=-view.middle, way=np.zeros((0, 3)), follow=False, still=True, labels=labels)
 
 
-def _surface(trajectory: Trajectory) -> Surface:
+def surface_of(trajectory: Trajectory) -> Surface:
     """Return the ground of the scenario that the trajectory keeps; flat where it keeps none."""
     scenario = stored(trajectory)
     return FlatGround() if scenario is None else scenario.surface
+
+
+def _rises(surface: Surface, place: Array, direction: Array) -> bool:
+    """Return whether the ground a metre from a place in a direction is higher than a metre the other way."""
+    step = np.array([*direction[:2], 0.0]) / np.linalg.norm(direction[:2])
+    ahead, behind = heights_below(surface, np.column_stack([place + step, place - step]))
+    return bool(ahead > behind + 0.01)
 
 
 def _frozen(trajectory: Trajectory, instants: Array) -> list[Trajectory]:
@@ -159,13 +170,18 @@ def _layout(
     return direction, shares[:, None] * (1.0 + _GAP) * width * right - (places - places.mean(axis=0)), True
 
 
-def _view(low: Array, high: Array, direction: Array, **more: float) -> View:
-    """Return the view of a box that reaches down to the ground."""
-    ground = np.array([*low[:2], min(low[2], 0.0)])
-    size, middle = high - ground, (high + ground) / 2.0
-    toward = np.abs(direction[:2]) / np.linalg.norm(direction[:2])
-    width, depth = float(toward[::-1] @ size[:2]), float(toward @ size[:2])
-    return View(middle=middle, width=width, height=float(size[2]), depth=depth, direction=direction, **more)
+def _view(boxes: Array, direction: Array, **more: float) -> View:
+    """Return the view of boxes, of which (boxes, 2, 3) are the lowest and highest corners, and of the ground below."""
+    toward = direction[:2] / np.linalg.norm(direction[:2])
+    axes = np.array([[-toward[1], toward[0]], toward])  # of the picture: to the right, and to the camera
+    ends = boxes[:, :, :2]
+    corners = np.concatenate([ends, np.stack([ends[:, [0, 1], [0, 1]], ends[:, [1, 0], [0, 1]]], axis=1)], axis=1)
+    placed = corners.reshape(-1, 2) @ axes.T
+    low, high = placed.min(axis=0), placed.max(axis=0)
+    bottom, top = min(boxes[:, 0, 2].min(), 0.0), boxes[:, 1, 2].max()
+    middle = np.array([*(low + high) / 2.0 @ axes, (bottom + top) / 2.0])
+    width, depth = (high - low).tolist()
+    return View(middle=middle, width=width, height=float(top - bottom), depth=depth, direction=direction, **more)
 
 
 def _extent(robot: Robot, trajectory: Trajectory, visuals: tuple[Visual, ...], moved: Array) -> tuple[Array, Array]:

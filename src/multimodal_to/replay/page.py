@@ -34,7 +34,12 @@ def write_html(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str
     Raises:
         OutputError: the folder does not exist or cannot be written.
     """
-    return write_text(path, _page(trajectory, player(robot, trajectory, meshes=meshes)))
+    return write_text(path, page(robot, trajectory, meshes=meshes))
+
+
+def page(robot: Robot, trajectory: Trajectory, *, meshes: bool = True) -> str:
+    """Return the page that `write_html` writes."""
+    return _page(trajectory, player(robot, trajectory, meshes=meshes))
 
 
 def write_still_html(

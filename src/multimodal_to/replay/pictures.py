@@ -14,15 +14,19 @@ from PIL import Image
 from multimodal_to.derived import flight_phases
 from multimodal_to.errors import InputError, OutputError
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.terrain import FlatGround
 from multimodal_to.replay.browser import open_browser
+from multimodal_to.replay.motion import surface_of
 from multimodal_to.replay.page import write_html, write_still_html
 from multimodal_to.replay.scene import HOLD
+from multimodal_to.resampling import resample
 from multimodal_to.trajectory import Array, Trajectory
 from multimodal_to.writing import whole
 
 GIF_SIZE, MP4_SIZE = (640, 560), (960, 720)  # [pixel]
 SNAPSHOT_SIZE = (400, 760)  # of each robot in a still scene [pixel]
 _COLOURS = 128  # of a GIF
+_ROOM = 0.35  # between ghosts that stand where they were [m]
 
 
 def write_gif(
@@ -104,13 +108,26 @@ def write_snapshots(
 
 
 def snapshot_times(trajectory: Trajectory) -> Array:
-    """Return five times [s] that tell a motion: start and end, and those where flight begins or ends, or even ones."""
+    """Return times [s] that tell a motion: start and end, and those where flight begins or ends, or even ones.
+
+    They are five; on ground that is not flat, where ghosts stand where they were, only those that leave room between.
+    """
     start, end = float(trajectory.time[0]), float(trajectory.time[-1])
     edges = [edge for phase in flight_phases(trajectory) for edge in phase if start < edge < end]
-    if len(edges) != 1:
-        return np.linspace(start, end, 5)
-    (edge,) = edges
-    return np.array([start, (start + edge) / 2, edge, (edge + end) / 2, end])
+    times = np.linspace(start, end, 5)
+    if len(edges) == 1:
+        times = np.array([start, (start + edges[0]) / 2, edges[0], (edges[0] + end) / 2, end])
+    return times if isinstance(surface_of(trajectory), FlatGround) else _apart(trajectory, times)
+
+
+def _apart(trajectory: Trajectory, times: Array) -> Array:
+    """Return the first and the last of times [s], and those between at which the CoM is away from all others kept."""
+    com = resample(trajectory, times).com_position[:2].T
+    kept = [0, len(times) - 1]
+    for index in range(1, len(times) - 1):
+        if np.linalg.norm(com[kept] - com[index], axis=1).min() > _ROOM:
+            kept.append(index)
+    return np.asarray(times[np.sort(kept)])
 
 
 def _frame_times(trajectory: Trajectory, rate: float) -> Array:

@@ -7,15 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from multimodal_to.models.terrain import FlatGround, Surface
-from multimodal_to.replay.scene import Y_TO_Z, Command, Scene, shapes, translation
+from multimodal_to.replay.scene import Y_TO_Z, Command, Scene, SmoothMesh, shapes, translation
 from multimodal_to.terrain_mesh import patch
 from multimodal_to.trajectory import Array
 
 _GRID_SPACING, _GRID_CELLS = 0.25, 16  # of the ground around the motion, in cells from its middle [m]
 _TERRAIN_AROUND = 2.0  # how far terrain is drawn beyond what is seen at once [m]
-_GROUND_COLOUR, _LINE_COLOUR = 0xB9C1CA, 0x7F8B98
+_GROUND_COLOUR, _STEEP_COLOUR, _LINE_COLOUR = 0xB9C1CA, 0x8793A1, 0x7F8B98
+_STEEP = math.cos(math.radians(30.0))  # ground whose normal's z is less, as the riser of a step, has its own colour
 _FIELD = math.tan(math.radians(37.5))  # half the height that the viewer's camera sees, per metre of distance, zoom 1
 _MARGIN = 1.1  # of what is seen over what must be
 
@@ -61,9 +63,17 @@ def _draw_ground(scene: Scene, view: View, surface: Surface, reach: float) -> No
     """Draw the ground: a disc with a grid where it is flat, else a patch of it with lines that show its shape."""
     if not isinstance(surface, FlatGround):
         terrain = patch(surface, view.middle[:2], view.width / 2 + reach + _TERRAIN_AROUND)
-        mesh = shapes.TriangularMeshGeometry(terrain.vertices, terrain.faces)
-        grey = shapes.MeshLambertMaterial(color=_GROUND_COLOUR)
-        scene.add("ground/terrain", mesh, grey, translation([0.0, 0.0, -0.002]), shadow=False)
+        one, two, three = (terrain.vertices[terrain.faces[:, corner]] for corner in range(3))
+        up = np.cross(two - one, three - one)
+        steep = up[:, 2] < _STEEP * np.linalg.norm(up, axis=1)
+        for name, faces, colour in (
+            ("terrain", terrain.faces[~steep], _GROUND_COLOUR), ("steep_terrain", terrain.faces[steep], _STEEP_COLOUR)
+        ):  # fmt: skip
+            part = trimesh.Trimesh(terrain.vertices, faces)  # drops the vertices that it does not use
+            if len(part.faces):
+                mesh = SmoothMesh(np.asarray(part.vertices), np.asarray(part.faces), np.asarray(part.vertex_normals))
+                grey = shapes.MeshLambertMaterial(color=colour)
+                scene.add(f"ground/{name}", mesh, grey, translation([0.0, 0.0, -0.002]), shadow=False)
         lines = shapes.LineBasicMaterial(color=_LINE_COLOUR, opacity=0.7)
         scene.add("ground/lines", shapes.LineSegments(shapes.PointsGeometry(terrain.lines), lines), None, np.eye(4))
         return

@@ -1,0 +1,58 @@
+"""What the shell offers when a person presses Tab: names that commands know, and files where they take them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from glob import escape, glob
+from pathlib import Path
+
+from multimodal_to.export import EXPORTS
+from multimodal_to.models.robot import bundled_robots
+from multimodal_to.scenarios import SCENARIOS
+
+
+def scenarios(incomplete: str) -> list[str]:
+    """Return the bundled scenarios that start so."""
+    return _starting(SCENARIOS, incomplete)
+
+
+def scenarios_or_files(incomplete: str) -> list[str]:
+    """Return the bundled scenarios and the TOML files and folders that start so."""
+    return scenarios(incomplete) + _paths(incomplete, (".toml",))
+
+
+def scenarios_or_trajectories(incomplete: str) -> list[str]:
+    """Return the bundled scenarios and the TOML files, trajectory files and folders that start so."""
+    return scenarios(incomplete) + _paths(incomplete, (".toml", ".npz"))
+
+
+def robots_or_folders(incomplete: str) -> list[str]:
+    """Return the bundled robots, and the folders that start so."""
+    return _starting(bundled_robots(), incomplete) + _paths(incomplete, ())
+
+
+def robots_or_urdfs(incomplete: str) -> list[str]:
+    """Return the bundled robots, and the URDF files and folders that start so."""
+    return _starting(bundled_robots(), incomplete) + _paths(incomplete, (".urdf",))
+
+
+def figures(incomplete: str) -> list[str]:
+    """Return the figures that start so, and `all`."""
+    from multimodal_to.plotting import FIGURES  # takes a second, which only this completion should wait for
+
+    return _starting((*FIGURES, "all"), incomplete)
+
+
+def exports(incomplete: str) -> list[str]:
+    """Return the kinds of export that start so."""
+    return _starting(EXPORTS, incomplete)
+
+
+def _starting(names: Iterable[str], incomplete: str) -> list[str]:
+    return [name for name in names if name.startswith(incomplete)]
+
+
+def _paths(incomplete: str, suffixes: tuple[str, ...]) -> list[str]:
+    found = sorted(glob(f"{escape(incomplete)}*"))
+    return [f"{path}/" if Path(path).is_dir() else path for path in found
+            if Path(path).is_dir() or path.endswith(suffixes)]  # fmt: skip
