@@ -185,7 +185,7 @@ BROKEN = {
     "an infinite thrust": arrays("'thrust' holds values larger than 1e+15", thrust=np.full((4, 21), np.inf)),
     "no rotation": arrays("a quaternion next to zero", base_quaternion_xyzw=np.zeros((4, 21))),
     "a time that stands": arrays("increase from knot to knot", time=np.zeros(21)),
-    "a file of a later release": arrays("format version 99", "reads 1 to 2", format_version=np.array(99)),
+    "a file of a later release": arrays("format version 99", "this release reads 1 to", format_version=np.array(99)),
     "a robot by its path": arrays("names its robot as the path '/tmp/evil'", "--robot", robot=np.array("/tmp/evil")),
     "a robot above": arrays("names its robot as the path '..'", robot=np.array("..")),
     "another robot's joints": arrays(
