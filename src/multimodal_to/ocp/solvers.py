@@ -54,12 +54,13 @@ _IPOPT_STATUS = {
 }
 
 
-_ROUGH_PUSH = 0.1
-"""How far the start guess is moved inside its bounds, in solver units and as a share of their distance."""
+_BOUND_PUSHES = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
+_PUSH = {"rough": 0.1, "exact": 1e-4, "warm": 1e-6}
+"""How far the start of each phase is moved inside its bounds, in solver units and as a share of their distance.
 
-
-_WARM_PUSH = 1e-6
-"""The same for an answer to start from, which touches its bounds."""
+A start guess far, so that it is free to move; what the rough phase has found little, so that it is not lost; and an
+answer, which touches its bounds, hardly at all.
+"""
 
 
 class Phase(Enum):
@@ -89,7 +90,9 @@ class Ipopt:
     violation_tolerance: float = 1e-7  # on the rows, in solver units
     max_iterations: int = 1000
     time_limit: float = math.inf  # wall time [s]
-    rough_iterations: int = 20
+    rough_iterations: int = 35  # at most
+    rough_violation: float = 3e-3
+    """The rough phase ends where no row is missed by more, in solver units: what follows is no longer its strength."""
     objective_scale: float = 1e-4
     """What the objective is multiplied by: it brings weights of 1e4 to 1e7, as the paper has them, near one.
 
@@ -111,6 +114,8 @@ class Ipopt:
             "sb": "yes",
             "linear_solver": "mumps",
             "mumps_pivtol": 1e-8,
+            "mumps_mem_percent": 50,  # of what it expects; by default it takes ten times that anew at each iteration
+            "fast_step_computation": "yes",
             "mu_strategy": "monotone",
             "mu_init": self.barrier_warm if phase is Phase.WARM else self.barrier_start,
             "tol": self.tolerance,
@@ -123,10 +128,7 @@ class Ipopt:
         }
         if math.isfinite(seconds):
             options["max_wall_time"] = seconds
-        if phase is Phase.ROUGH:
-            options |= dict.fromkeys(("bound_push", "bound_frac"), _ROUGH_PUSH)
-        if phase is Phase.WARM:
-            options |= dict.fromkeys(("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"), _WARM_PUSH)
+        options |= dict.fromkeys(_BOUND_PUSHES, _PUSH[phase.value])
         return options
 
     @staticmethod

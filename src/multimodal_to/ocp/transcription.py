@@ -6,6 +6,7 @@ small, and the horizon's matrices are these blocks at known places; deriving the
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +20,27 @@ from multimodal_to.adam.spatial import SX
 Integers = NDArray[np.int64]
 
 
+THREADS = min(os.cpu_count() or 1, 4)
+"""Threads that evaluate the stages; what comes out doesn't depend on their number."""
+
+PRODUCT_DAMPING = 0.1
+"""How much of what would make the Hessian of a product of length and force positive semidefinite is added to it [1].
+
+A relaxed contact is λ a b with a length a and a force b, an indefinite saddle. λ a b + |λ| (r a² + b²/r)/2 is none for
+any r > 0, and with r = |b|/|a| it keeps its curvature along a b = const. All of it makes steps short, nothing of it
+makes IPOPT factorise again and again to find how much it lacks; a tenth spares most of that and costs no iterations.
+"""
+_SMALL_LENGTH, _SMALL_FORCE = 1e-4, 1.0  # added to |a| [m] and |b| [N] in r, in the root of squares
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Family:
+    """The rows of one name."""
+
+    rows: SX  # (m, 1), scaled
+    factors: tuple[SX, SX] | None = None  # (m, 1) each, lengths and forces, where the rows are their products
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage:
     """Rows and costs of the intervals that start at `starts`, in (z_k, z_k+1, Δt) in solver units."""
@@ -28,12 +50,17 @@ class Stage:
     start: SX  # z_k, (size, 1)
     end: SX  # z_k+1, (size, 1)
     interval: SX  # Δt, (1, 1)
-    rows: SX  # (m, 1), scaled
+    families: tuple[Family, ...]
     costs: SX  # (c, 1), one per name, weighted
 
     @cached_property
     def _arguments(self) -> SX:
         return cs.vertcat(self.start, self.end, self.interval)
+
+    @cached_property
+    def rows(self) -> SX:
+        """Return all rows, (m, 1)."""
+        return cs.vertcat(cs.SX(0, 1), *(family.rows for family in self.families))
 
     @property
     def repeats(self) -> int:
@@ -56,19 +83,41 @@ class Stage:
         return self._function("costs", self.costs)
 
     def jacobian(self) -> tuple[cs.Function, cs.Sparsity]:
-        """Return (z, z⁺, Δt) → nonzeros of ∂rows/∂(z, z⁺, Δt), and their places."""
-        return self._nonzeros("jacobian", cs.jacobian(self.rows, self._arguments))
+        """Return (z, z⁺, Δt) → nonzeros of ∂rows/∂(z, z⁺, Δt), and their places.
+
+        Each family is derived on its own: together they would share directions, at twice the operations.
+        """
+        blocks = [cs.jacobian(family.rows, self._arguments) for family in self.families]
+        return self._nonzeros("jacobian", cs.vertcat(cs.SX(0, self._arguments.shape[0]), *blocks))
 
     def gradient(self) -> tuple[cs.Function, cs.Sparsity]:
         """Return (z, z⁺, Δt) → nonzeros of the gradient of all costs, and their places."""
         return self._nonzeros("gradient", cs.sparsify(cs.gradient(cs.sum1(self.costs), self._arguments)))
 
     def hessian(self) -> tuple[cs.Function, cs.Sparsity]:
-        """Return (z, z⁺, Δt, σ, λ) → nonzeros of the upper Hessian of σ Σ costs + λᵀ rows, and their places."""
+        """Return (z, z⁺, Δt, σ, λ) → nonzeros of the upper Hessian of σ Σ costs + λᵀ rows, damped, and their places."""
         sigma, multipliers = cs.SX.sym("sigma"), cs.SX.sym("lambda", self.rows.shape[0])
         lagrangian = sigma * cs.sum1(self.costs) + cs.dot(multipliers, self.rows)
-        upper = cs.triu(cs.hessian(lagrangian, self._arguments)[0])
+        exact, _ = cs.hessian(lagrangian, self._arguments)
+        upper = cs.triu(exact + PRODUCT_DAMPING * self._damping(multipliers))
         return self._nonzeros("hessian", upper, sigma, multipliers)
+
+    def _damping(self, multipliers: SX) -> SX:
+        """Return the Hessian of Σ |λ| (r a² + b²/r)/2 over all products a b, with |λ| and r held."""
+        size, first = self._arguments.shape[0], 0
+        total = cs.SX(size, size)
+        for family in self.families:
+            count = family.rows.shape[0]
+            weight = cs.fabs(multipliers[first : first + count])
+            first += count
+            if family.factors is None:
+                continue
+            lengths, forces = family.factors
+            ratio = cs.sqrt((forces**2 + _SMALL_FORCE**2) / (lengths**2 + _SMALL_LENGTH**2))
+            for factor, share in ((lengths, weight * ratio), (forces, weight / ratio)):
+                slope = cs.jacobian(factor, self._arguments)
+                total += slope.T @ cs.diag(share) @ slope
+        return total
 
     def cost_hessian(self) -> tuple[cs.Function, cs.Sparsity]:
         """Return (z, z⁺, Δt, σ) → nonzeros of the upper Hessian of σ Σ costs alone, and their places."""
@@ -82,7 +131,7 @@ class Stage:
 
     def _function(self, kind: str, output: SX, *more: SX) -> cs.Function:
         arguments = [self.start, self.end, self.interval, *more]
-        return cs.Function(f"{self.name}_{kind}", arguments, [cs.cse(output)])
+        return cs.Function(f"{self.name}_{kind}", arguments, [output])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,20 +167,20 @@ def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
         own = cs.reshape(multipliers[first_row : first_row + height * stage.repeats], height, stage.repeats)
         first_row += height * stage.repeats
 
-        rows.append(cs.vec(stage.row_function().map(stage.repeats)(*arguments)))
-        costs.append(cs.sum2(stage.cost_function().map(stage.repeats)(*arguments)))
+        rows.append(cs.vec(_mapped(stage.row_function(), stage.repeats)(*arguments)))
+        costs.append(cs.sum2(_mapped(stage.cost_function(), stage.repeats)(*arguments)))
         function, pattern = stage.gradient()
-        gradients.add(function.map(stage.repeats)(*arguments), places[pattern.row()], np.zeros_like(places[:1]))
+        gradients.add(_mapped(function, stage.repeats)(*arguments), places[pattern.row()], np.zeros_like(places[:1]))
         function, pattern = stage.jacobian()
         row, column = pattern.get_triplet()
-        jacobians.add(function.map(stage.repeats)(*arguments), row_places[row], places[column])
+        jacobians.add(_mapped(function, stage.repeats)(*arguments), row_places[row], places[column])
         function, pattern = stage.hessian()
         row, column = pattern.get_triplet()
         sigmas = cs.repmat(factor, 1, stage.repeats)
-        hessians.add(function.map(stage.repeats)(*arguments, sigmas, own), places[row], places[column])
+        hessians.add(_mapped(function, stage.repeats)(*arguments, sigmas, own), places[row], places[column])
         function, pattern = stage.cost_hessian()
         row, column = pattern.get_triplet()
-        cost_hessians.add(function.map(stage.repeats)(*arguments, sigmas), places[row], places[column])
+        cost_hessians.add(_mapped(function, stage.repeats)(*arguments, sigmas), places[row], places[column])
 
     all_rows, all_costs = cs.vertcat(*rows), cs.vertcat(*costs)
     objective = cs.sum1(all_costs)
@@ -148,6 +197,11 @@ def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
         hessian=_hessian(x, p, factor, multipliers, hessians.matrix(count, count)),
         cost_hessian=_hessian(x, p, factor, multipliers, cost_hessians.matrix(count, count)),
     )  # fmt: skip
+
+
+def _mapped(function: cs.Function, repeats: int) -> cs.Function:
+    """Return a function of `repeats` columns, evaluated by `THREADS` at once; each column is what it would be alone."""
+    return function if repeats == 1 else function.map(repeats, "thread", min(THREADS, repeats))
 
 
 def _hessian(x: cs.MX, p: cs.MX, factor: cs.MX, multipliers: cs.MX, matrix: cs.MX) -> cs.Function:
