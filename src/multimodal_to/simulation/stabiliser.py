@@ -85,13 +85,13 @@ def correct(
     origin = loads[standing] @ points[standing] / load if standing.size else com
     rows = _MOMENTS if standing.size else np.ones(6)
     about = wanted.copy()
-    about[3:] += np.cross(com - origin, wanted[:3])
+    about[3:] += _skew(com - origin) @ wanted[:3]
     thrust, missing = _thrusts(simulation, data, about, origin, turbines, plan.thrust[step], THRUST_WEIGHTS * rows)
 
     forces = np.zeros((len(robot.contacts), 3))
     if standing.size:
         lacking = missing.copy()
-        lacking[3:] += np.cross(origin - com, missing[:3])
+        lacking[3:] += _skew(origin - com) @ missing[:3]
         forces[standing] = _contact_forces(
             plan.contact_forces[step][standing], points[standing] - com, lacking, friction
         )
