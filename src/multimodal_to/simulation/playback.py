@@ -18,19 +18,23 @@ from multimodal_to.models.terrain import FlatGround
 from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.simulation.model import DAMPING, STIFFNESS, TIME_STEP, SimulationModel, build_model, mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
-from multimodal_to.simulation.stabiliser import Correction, Turbines, correct
+from multimodal_to.simulation.stabiliser import Correction, Turbines, correct, rotation_vector
 from multimodal_to.trajectory import Array, Trajectory
 
 HOLD = 1.0  # how long the end of the plan is held [s]
 PERIOD = 4  # steps of the simulation between two decisions of the stabiliser [1]
 THRUST_STIFFNESS, THRUST_DAMPING = 25.0, 10.0  # K_T [1/s²], D_T [1/s]
 JOINT_LAG = 0.03  # with which joints take over the stabiliser's wish [s]
+FALL_TILT = 45.0
+"""A base turned away from the plan by more than this has fallen [°]."""
+FALL_DEPTH = 0.25
+"""A CoM lower than the plan by more than this has fallen [m]."""
 REACH = 2.0  # how far ground that is no plane goes beyond the way of the CoM [m]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Playback:
-    """What a simulation did: a row for each of its steps, in world axes."""
+    """What a simulation did: a row for each of its steps, in world axes. A robot that has fallen stays as it is."""
 
     robot: Robot
     plan: Trajectory
@@ -44,6 +48,7 @@ class Playback:
     thrust_rate: Array  # [N/s], (steps, jets)
     throttle: Array  # [%], (steps, jets)
     torques: Array  # of the servos [N m], (steps, n)
+    fell: float | None  # when [s]
 
 
 def play(robot: Robot, plan: Trajectory, *, stabilise: bool = True) -> Playback:
@@ -102,8 +107,12 @@ class _Player:
             rows[-1] |= self._control(step)
             self._mujoco.mj_step2(model, data)
             rows[-1] |= {"contact_forces": self._contact_forces()}
+            if self._is_down(step):
+                break
+        fell = None if len(rows) == self._time.size else float(self._time[len(rows) - 1])
+        rows += [rows[-1]] * (self._time.size - len(rows))
         return Playback(
-            robot=self._robot, plan=plan, reference=self._reference, time=self._time,
+            robot=self._robot, plan=plan, reference=self._reference, time=self._time, fell=fell,
             **{name: np.array([row[name] for row in rows]) for name in rows[0]},
         )  # fmt: skip
 
@@ -119,6 +128,11 @@ class _Player:
             "thrust": self._thrust.copy(),
             "thrust_rate": self._rate.copy(),
         }  # fmt: skip
+
+    def _is_down(self, step: int) -> bool:
+        wanted, data = self._reference, self._data
+        tilt = np.linalg.norm(rotation_vector(wanted.rotation[step] @ data.xmat[1].reshape(3, 3).T))
+        return bool(np.degrees(tilt) > FALL_TILT or wanted.com[step, 2] - data.subtree_com[1, 2] > FALL_DEPTH)
 
     def _decide(self, step: int) -> None:
         """Let the stabiliser look at the state."""
