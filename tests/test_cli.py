@@ -203,6 +203,11 @@ def test_plot_and_replay_read_a_saved_file(file, tmp_path):
     assert (tmp_path / "forces.svg").read_text(encoding="utf-8").startswith("<?xml")
     assert run("replay", file, "--html", tmp_path / "page.html").returncode == 0
     assert (tmp_path / "page.html").stat().st_size > 800_000  # the viewer is inside
+    assert run("replay", file, "--with", file, "--html", tmp_path / "both.html").returncode == 0
+    assert "faint, and its line" in (tmp_path / "both.html").read_text(encoding="utf-8")
+    refused = run("replay", file, "--with", file, "--snapshots", tmp_path / "stills.png")
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert "--snapshots shows one trajectory" in refused.stderr
 
 
 def test_all_figures_of_two_files_are_plotted_under_names_of_their_own(file, tmp_path):

@@ -12,7 +12,7 @@ import yourdfpy
 
 from multimodal_to import replay, scenarios
 from multimodal_to.derived import frame_poses
-from multimodal_to.errors import OutputError
+from multimodal_to.errors import InputError, OutputError
 from multimodal_to.models.robot import load_robot
 from multimodal_to.models.terrain import Stairs
 from multimodal_to.ocp.scenario_data import to_json
@@ -99,6 +99,28 @@ class Stage:
             places = [self.value(path, "position", k) for k in (knot, after)]
             pose[:3, 3] = (1 - part) * places[0] + part * places[1]
         return pose
+
+
+def test_another_motion_is_drawn_with_the_first_in_step_and_faint(robot, trajectory, tmp_path):
+    later = replace(trajectory, time=2.0 * trajectory.time + 3.0, base_position=trajectory.base_position + 0.1)
+    path = replay.write_html(robot, trajectory, tmp_path / "both.html", ghost=later, meshes=False)
+    text = path.read_text(encoding="utf-8")
+    both = Stage(text)
+    own, ghost = ("/meshcat/robot/root_link", "/meshcat/ghost/robot/root_link")
+    for knot in (0, 10, KNOTS):  # the ghost takes twice as long, so it is half as far
+        expected = frame_poses(robot, later, "root_link")[knot // 2]
+        np.testing.assert_allclose(both.world(ghost, knot), expected, atol=1e-6)
+        np.testing.assert_allclose(both.world(own, knot), frame_poses(robot, trajectory, "root_link")[knot], atol=1e-6)
+    opacity = {path: object["materials"][0]["opacity"] for path, object in both.objects.items() if "visual_" in path}
+    assert {value for path, value in opacity.items() if "/ghost/" in path} == {0.35}
+    assert {value for path, value in opacity.items() if "/ghost/" not in path} == {1.0}
+    assert f"faint, and its line: {later.scenario}" in text.replace("&amp;", "&")
+
+
+def test_a_motion_of_another_robot_is_no_ghost(robot, trajectory, tmp_path):
+    stranger = replace(trajectory, robot="stranger")
+    with pytest.raises(InputError, match="of 'stranger' with 23 joints; expected 'ironcub'"):
+        replay.write_html(robot, trajectory, tmp_path / "both.html", ghost=stranger)
 
 
 def test_the_page_fetches_nothing(page):

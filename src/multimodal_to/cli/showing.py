@@ -74,6 +74,10 @@ def replay(
     snapshots: Annotated[Path | None, typer.Option(help="Write a PNG of the robot at several times.")] = None,
     times: Annotated[str, typer.Option(help="Times of the snapshots [s], as 0,2.5,7.")] = "",
     fps: Annotated[float | None, typer.Option(help="Frames a second. [GIF 12.5, MP4 25]")] = None,
+    beside: Annotated[
+        Path | None,
+        typer.Option("--with", metavar="OTHER", help="Draw another trajectory of the robot with it, faint."),
+    ] = None,
     meshes: Annotated[bool, typer.Option(help="Draw meshes where the robot has them.")] = True,
     robot: RobotOption = "",
 ) -> None:
@@ -82,6 +86,9 @@ def replay(
     Example: multimodal-to replay results/take-off/trajectory.npz --html take-off.html --gif take-off.gif
     """
     the_robot, trajectory = loaded(file, robot)
+    ghost = None if beside is None else loaded(beside, robot)[1]
+    if ghost is not None and snapshots is not None:
+        raise InputError("--with goes with pages, GIF, MP4 and the live viewer; --snapshots shows one trajectory")
     instants = option_numbers("--times", times) if times else None
     wanted = {".html": html, ".png": snapshots, ".gif": gif, ".mp4": mp4}
     targets = {suffix: path for suffix, path in wanted.items() if path is not None}
@@ -90,16 +97,20 @@ def replay(
     from multimodal_to.replay import show, write_gif, write_html, write_mp4, write_snapshots
 
     write = {
-        ".html": lambda path: write_html(the_robot, trajectory, path, meshes=meshes),
+        ".html": lambda path: write_html(the_robot, trajectory, path, ghost=ghost, meshes=meshes),
         ".png": lambda path: write_snapshots(the_robot, trajectory, path, times=instants, meshes=meshes),
-        ".gif": lambda path: write_gif(the_robot, trajectory, path, rate=12.5 if fps is None else fps, meshes=meshes),
-        ".mp4": lambda path: write_mp4(the_robot, trajectory, path, rate=25.0 if fps is None else fps, meshes=meshes),
+        ".gif": lambda path: write_gif(
+            the_robot, trajectory, path, rate=12.5 if fps is None else fps, ghost=ghost, meshes=meshes
+        ),
+        ".mp4": lambda path: write_mp4(
+            the_robot, trajectory, path, rate=25.0 if fps is None else fps, ghost=ghost, meshes=meshes
+        ),
     }
     for suffix, path in targets.items():
         out.print(f"wrote {write[suffix](path)}", soft_wrap=True)
     if targets:
         return
-    visualizer = show(the_robot, trajectory, meshes=meshes)
+    visualizer = show(the_robot, trajectory, ghost=ghost, meshes=meshes)
     out.print(f"replaying at {visualizer.url()}; Ctrl-C ends", soft_wrap=True)
     visualizer.open()
     try:

@@ -12,10 +12,16 @@ from multimodal_to.replay.visuals import appearance
 from multimodal_to.trajectory import Trajectory
 
 
-def show(robot: Robot, trajectory: Trajectory, *, meshes: bool = True) -> meshcat.Visualizer:
-    """Start meshcat's server, draw the motion there and return the visualizer; a browser at its `url()` plays it."""
+def show(
+    robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = None, meshes: bool = True
+) -> meshcat.Visualizer:
+    """Start meshcat's server, draw the motion there and return the visualizer; a browser at its `url()` plays it.
+
+    Raises:
+        InputError: the ghost, another motion to be drawn faint, is not one of the same robot.
+    """
     look = appearance(robot.urdf, meshes=meshes)
     with redirect_stdout(io.StringIO()):  # meshcat prints the address
         visualizer = meshcat.Visualizer()
-    draw_motion(visualizer, robot, trajectory, look, live=True)
+    draw_motion(visualizer, robot, trajectory, look, ghost=ghost, live=True)
     return visualizer

@@ -15,6 +15,7 @@ from multimodal_to.models.terrain import FlatGround, Surface, heights_below
 from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.replay.bodies import draw_links, draw_visuals, drawn, faded, link_paths, link_poses
 from multimodal_to.replay.effects import draw_com, draw_com_trace, draw_contact_forces, draw_flames
+from multimodal_to.replay.ghost import draw_ghost, in_step
 from multimodal_to.replay.scene import Scene, meshcat
 from multimodal_to.replay.stage import View, draw_stage
 from multimodal_to.replay.visuals import Appearance, Visual
@@ -47,9 +48,12 @@ class Picture:
 
 
 def draw_motion(
-    visualizer: meshcat.Visualizer, robot: Robot, trajectory: Trajectory, look: Appearance, *, live: bool = False
-) -> Picture:
+    visualizer: meshcat.Visualizer, robot: Robot, trajectory: Trajectory, look: Appearance, *,
+    ghost: Trajectory | None = None, live: bool = False,
+) -> Picture:  # fmt: skip
     """Draw stage, robot, flames, contact forces and CoM, and set the animation that moves them, at true speed.
+
+    A `ghost` is another motion of the robot, drawn faint; it begins with this one.
 
     In meshcat's own `live` page the animation also moves the scene so that the camera follows, which ours does itself,
     and flames keep one brightness, since it knows the materials too late.
@@ -59,6 +63,10 @@ def draw_motion(
     span = np.ptp(com, axis=0)
     follow = bool(np.linalg.norm(span) > FOLLOW_FROM)
     low, high = _extent(robot, trajectory, look.visuals, com - com[0] if follow else np.zeros_like(com))
+    if ghost is not None:
+        ghost = in_step(trajectory, ghost)
+        corners = _extent(robot, ghost, look.visuals, com - com[0] if follow else np.zeros_like(com))
+        low, high = np.minimum(low, corners[0]), np.maximum(high, corners[1])
     low[2] = min(low[2], 0.0) - _BAR * (high[2] - low[2])
     surface = surface_of(trajectory)
     direction = _BEHIND_LEFT if _rises(surface, com.mean(axis=0), _HALF_LEFT) else _HALF_LEFT
@@ -71,6 +79,8 @@ def draw_motion(
     draw_flames(scene, robot, trajectory.thrust, paths, steady=live)
     draw_contact_forces(scene, robot, trajectory)
     draw_com(scene, trajectory)
+    if ghost is not None:
+        draw_ghost(scene, robot, ghost, look)
     way = -view.middle - (com - com[0])
     if follow and live:
         scene.move("", "position", way)

@@ -13,6 +13,7 @@ from typing import Any
 
 from multimodal_to.derived import flight_phases
 from multimodal_to.models.robot import Robot
+from multimodal_to.replay.ghost import GHOST_COLOUR
 from multimodal_to.replay.motion import Picture, draw_motion, draw_still
 from multimodal_to.replay.scene import HOLD, Recorder, meshcat
 from multimodal_to.replay.visuals import appearance
@@ -26,20 +27,25 @@ _COM = ("#2b6ce0", "sphere and line: centre of mass")
 _FLIGHT = ("#d62728", "bar above the time: flight")
 
 
-def write_html(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *, meshes: bool = True) -> Path:
+def write_html(
+    robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *,
+    ghost: Trajectory | None = None, meshes: bool = True,
+) -> Path:  # fmt: skip
     """Write one page that plays the motion in a browser, from disk, with networking off; whole or not at all.
 
     Opened with ``#t=2.5`` at its address's end, it stands still at 2.5 s; ``#t=2.5&bare`` hides the panels as well.
+    A `ghost` is another motion of the same robot, drawn faint: the plan of a simulation, or the other way round.
 
     Raises:
+        InputError: the ghost is not one of the same robot.
         OutputError: the folder does not exist or cannot be written.
     """
-    return write_text(path, page(robot, trajectory, meshes=meshes))
+    return write_text(path, page(robot, trajectory, ghost=ghost, meshes=meshes))
 
 
-def page(robot: Robot, trajectory: Trajectory, *, meshes: bool = True) -> str:
+def page(robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = None, meshes: bool = True) -> str:
     """Return the page that `write_html` writes."""
-    return _page(trajectory, player(robot, trajectory, meshes=meshes))
+    return _page(trajectory, player(robot, trajectory, ghost=ghost, meshes=meshes))
 
 
 def write_still_html(
@@ -57,22 +63,27 @@ def write_still_html(
     return write_text(path, _page(trajectory, _player(trajectory, recorder, picture, look.attribution)))
 
 
-def player(robot: Robot, trajectory: Trajectory, *, meshes: bool = True) -> str:
+def player(robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = None, meshes: bool = True) -> str:
     """Return the HTML that plays the motion, for a page that has one: a block as high as what it stands in."""
     recorder, look = Recorder(), appearance(robot.urdf, meshes=meshes)
-    picture = draw_motion(meshcat.Visualizer(window=recorder), robot, trajectory, look)
-    return _player(trajectory, recorder, picture, look.attribution)
+    picture = draw_motion(meshcat.Visualizer(window=recorder), robot, trajectory, look, ghost=ghost)
+    return _player(trajectory, recorder, picture, look.attribution, ghost)
 
 
 def _page(trajectory: Trajectory, content: str) -> str:
     return _template("page.html").substitute(title=_title(trajectory), player=content)
 
 
-def _player(trajectory: Trajectory, recorder: Recorder, picture: Picture, attribution: str) -> str:
+def _player(
+    trajectory: Trajectory, recorder: Recorder, picture: Picture, attribution: str, ghost: Trajectory | None = None
+) -> str:
     phases = [] if picture.still or not trajectory.contact_names else flight_phases(trajectory)
     shown = {_FLAME: trajectory.jet_names, _ARROW: trajectory.contact_names, _COM: not picture.still, _FLIGHT: phases}
     keys = [f'<div><span class="key" style="background: {colour}"></span>{text}</div>'
             for (colour, text), some in shown.items() if some]  # fmt: skip
+    if ghost is not None:
+        text = f"faint, and its line: {html.escape(ghost.scenario)}"
+        keys.append(f'<div><span class="key" style="background: #{GHOST_COLOUR:06x}"></span>{text}</div>')
     return _template("player.html").substitute(
         title=_title(trajectory),
         legend="".join(keys),

@@ -31,17 +31,18 @@ _ROOM = 0.35  # between ghosts that stand where they were [m]
 
 def write_gif(
     robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *,
-    rate: float = 12.5, size: tuple[int, int] = GIF_SIZE, meshes: bool = True,
+    rate: float = 12.5, size: tuple[int, int] = GIF_SIZE, ghost: Trajectory | None = None, meshes: bool = True,
 ) -> Path:  # fmt: skip
     """Write the motion as a GIF that repeats, at true speed, of `rate` frames a second.
 
     Raises:
-        InputError: the rate is not positive.
+        InputError: the rate is not positive, or the ghost, a motion to be drawn faint, is not one of the same robot.
         OutputError: there is no browser, or the file cannot be written.
     """
     times = _frame_times(trajectory, rate)
     with whole(path) as draft:
-        frames = [Image.open(io.BytesIO(shot)).convert("RGB") for shot in _film(robot, trajectory, times, size, meshes)]
+        shots = _film(robot, trajectory, times, size, ghost, meshes)
+        frames = [Image.open(io.BytesIO(shot)).convert("RGB") for shot in shots]
         palette = frames[len(frames) // 2].quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
         pictures = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
         ends = np.round(100.0 * np.append(times[1:], times[-1] + HOLD))  # a GIF counts hundredths of a second
@@ -54,12 +55,12 @@ def write_gif(
 
 def write_mp4(
     robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *,
-    rate: float = 25.0, size: tuple[int, int] = MP4_SIZE, meshes: bool = True,
+    rate: float = 25.0, size: tuple[int, int] = MP4_SIZE, ghost: Trajectory | None = None, meshes: bool = True,
 ) -> Path:  # fmt: skip
     """Write the motion as an MP4 (H.264), at true speed, of `rate` frames a second; the last pose stands for a second.
 
     Raises:
-        InputError: the rate is not positive.
+        InputError: the rate is not positive, or the ghost, a motion to be drawn faint, is not one of the same robot.
         OutputError: there is no browser or no imageio-ffmpeg, or the file cannot be written.
     """
     try:
@@ -75,7 +76,7 @@ def write_mp4(
         writer.send(None)
         try:
             frame = b""
-            for shot in _film(robot, trajectory, times, size, meshes):
+            for shot in _film(robot, trajectory, times, size, ghost, meshes):
                 frame = Image.open(io.BytesIO(shot)).convert("RGB").tobytes()
                 writer.send(frame)
             for _ in range(round(HOLD * rate)):
@@ -137,10 +138,12 @@ def _frame_times(trajectory: Trajectory, rate: float) -> Array:
     return np.arange(count) / rate
 
 
-def _film(robot: Robot, trajectory: Trajectory, times: Array, size: tuple[int, int], meshes: bool) -> Iterator[bytes]:
+def _film(
+    robot: Robot, trajectory: Trajectory, times: Array, size: tuple[int, int], ghost: Trajectory | None, meshes: bool
+) -> Iterator[bytes]:
     """Return a picture of the page at each time [s], with its clock and without its buttons."""
     with tempfile.TemporaryDirectory() as folder:
-        page = write_html(robot, trajectory, Path(folder) / "film.html", meshes=meshes)
+        page = write_html(robot, trajectory, Path(folder) / "film.html", ghost=ghost, meshes=meshes)
         with open_browser(size) as browser:
             browser.open(page, "#film&t=0")
             for instant in times.tolist():

@@ -18,18 +18,23 @@ from multimodal_to.models.terrain import FlatGround
 from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.simulation.model import DAMPING, STIFFNESS, TIME_STEP, SimulationModel, build_model, mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
-from multimodal_to.simulation.stabiliser import Correction, Turbines, correct
+from multimodal_to.simulation.stabiliser import Correction, Turbines, correct, rotation_vector
 from multimodal_to.trajectory import Array, Trajectory
 
 HOLD = 1.0  # how long the end of the plan is held [s]
+PERIOD = 4  # steps of the simulation between two decisions of the stabiliser [1]
 THRUST_STIFFNESS, THRUST_DAMPING = 25.0, 10.0  # K_T [1/s²], D_T [1/s]
 JOINT_LAG = 0.03  # with which joints take over the stabiliser's wish [s]
+FALL_TILT = 45.0
+"""A base turned away from the plan by more than this has fallen [°]."""
+FALL_DEPTH = 0.25
+"""A CoM lower than the plan by more than this has fallen [m]."""
 REACH = 2.0  # how far ground that is no plane goes beyond the way of the CoM [m]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Playback:
-    """What a simulation did: a row for each of its steps, in world axes."""
+    """What a simulation did: a row for each of its steps, in world axes. A robot that has fallen stays as it is."""
 
     robot: Robot
     plan: Trajectory
@@ -43,6 +48,7 @@ class Playback:
     thrust_rate: Array  # [N/s], (steps, jets)
     throttle: Array  # [%], (steps, jets)
     torques: Array  # of the servos [N m], (steps, n)
+    fell: float | None  # when [s]
 
 
 def play(robot: Robot, plan: Trajectory, *, stabilise: bool = True) -> Playback:
@@ -83,6 +89,7 @@ class _Player:
         self._inertia = _inertia(self._robot)
         self._thrust, self._rate = plan.thrust[:, 0].copy(), plan.thrust_rate[:, 0].copy()
         self._throttle, self._shift = plan.throttle[:, 0].copy(), np.zeros(len(self._robot.joint_names))
+        self._correction, self._borne = Correction.none(self._robot), np.zeros(len(self._robot.joint_names))
 
     def run(self) -> Playback:
         plan, data, model = self._plan, self._data, self._simulation.model
@@ -94,13 +101,18 @@ class _Player:
         rows: list[dict[str, Array]] = []
         for step in range(self._time.size):
             self._mujoco.mj_step1(model, data)
-            self._mujoco.mj_subtreeVel(model, data)
             rows.append(self._state())
+            if self._stabilise and step % PERIOD == 0:
+                self._decide(step)
             rows[-1] |= self._control(step)
             self._mujoco.mj_step2(model, data)
             rows[-1] |= {"contact_forces": self._contact_forces()}
+            if self._is_down(step):
+                break
+        fell = None if len(rows) == self._time.size else float(self._time[len(rows) - 1])
+        rows += [rows[-1]] * (self._time.size - len(rows))
         return Playback(
-            robot=self._robot, plan=plan, reference=self._reference, time=self._time,
+            robot=self._robot, plan=plan, reference=self._reference, time=self._time, fell=fell,
             **{name: np.array([row[name] for row in rows]) for name in rows[0]},
         )  # fmt: skip
 
@@ -117,21 +129,31 @@ class _Player:
             "thrust_rate": self._rate.copy(),
         }  # fmt: skip
 
+    def _is_down(self, step: int) -> bool:
+        wanted, data = self._reference, self._data
+        tilt = np.linalg.norm(rotation_vector(wanted.rotation[step] @ data.xmat[1].reshape(3, 3).T))
+        return bool(np.degrees(tilt) > FALL_TILT or wanted.com[step, 2] - data.subtree_com[1, 2] > FALL_DEPTH)
+
+    def _decide(self, step: int) -> None:
+        """Let the stabiliser look at the state."""
+        turbines = Turbines(
+            thrust=self._thrust,
+            at_most=self._throttle >= np.array([jet.throttle_max for jet in self._robot.jets]),
+            at_least=self._throttle <= np.array([jet.throttle_min for jet in self._robot.jets]),
+        )
+        self._mujoco.mj_subtreeVel(self._simulation.model, self._data)
+        self._correction = correct(
+            self._simulation, self._data, self._reference, step, turbines, self._inertia, self._friction
+        )
+        self._borne = self._borne_by_joints(step)
+
     def _control(self, step: int) -> dict[str, Array]:
         """Set the servos' targets and the thrusts of this step; return throttles and torques."""
-        data, plan, robot = self._data, self._reference, self._robot
-        correction = Correction.none(robot)
-        if self._stabilise:
-            turbines = Turbines(
-                thrust=self._thrust,
-                at_most=self._throttle >= np.array([jet.throttle_max for jet in robot.jets]),
-                at_least=self._throttle <= np.array([jet.throttle_min for jet in robot.jets]),
-            )
-            correction = correct(self._simulation, data, plan, step, turbines, self._inertia, self._friction)
-        self._turn_turbines(step, correction.thrust)
-        self._shift += (correction.joints - self._shift) * TIME_STEP / JOINT_LAG
-        torques = plan.torques[step] - self._borne_by_joints(step, correction)
-        count = len(robot.joint_names)
+        data, plan = self._data, self._reference
+        self._turn_turbines(step, self._correction.thrust)
+        self._shift += (self._correction.joints - self._shift) * TIME_STEP / JOINT_LAG
+        torques = plan.torques[step] - self._borne
+        count = self._shift.size
         target = plan.joints[step] + self._shift
         data.ctrl[:count] = target + (torques + DAMPING * plan.joint_velocities[step]) / STIFFNESS
         data.ctrl[count:] = self._thrust
@@ -155,30 +177,31 @@ class _Player:
             self._rate[index] += TIME_STEP * float(jet.model.acceleration(*state, throttle))
             self._thrust[index] = max(state[0] + TIME_STEP * self._rate[index], 0.0)
 
-    def _borne_by_joints(self, step: int, correction: Correction) -> Array:
+    def _borne_by_joints(self, step: int) -> Array:
         """Return Jᵀ f of the thrusts' difference from the plan and of the forces that are asked of the ground."""
         data, simulation, plan = self._data, self._simulation, self._reference
         jacobian, total = np.zeros((3, simulation.model.nv)), np.zeros(simulation.model.nv)
-        if self._stabilise:
-            for index, site in enumerate(simulation.jets):
-                self._mujoco.mj_jacSite(simulation.model, data, jacobian, None, site)
-                axis = -data.site_xmat[site].reshape(3, 3)[:, 2]
-                total += jacobian.T @ axis * (self._thrust[index] - plan.thrust[step, index])
-            for index, force in enumerate(correction.contact_forces):
-                if force.any():
-                    self._mujoco.mj_jacGeom(simulation.model, data, jacobian, None, simulation.points[index])
-                    total += jacobian.T @ force
+        for index, site in enumerate(simulation.jets):
+            self._mujoco.mj_jacSite(simulation.model, data, jacobian, None, site)
+            axis = -data.site_xmat[site].reshape(3, 3)[:, 2]
+            total += jacobian.T @ axis * (self._thrust[index] - plan.thrust[step, index])
+        for index, force in enumerate(self._correction.contact_forces):
+            if force.any():
+                self._mujoco.mj_jacGeom(simulation.model, data, jacobian, None, simulation.points[index])
+                total += jacobian.T @ force
         return np.asarray(total[simulation.joint_velocities])
 
     def _contact_forces(self) -> Array:
         """Return the force of the ground on each contact point, (contacts, 3)."""
-        data, points = self._data, self._simulation.points.tolist()
-        forces, wrench = np.zeros((len(points), 3)), np.zeros(6)
-        for index, contact in enumerate(data.contact):
-            first, second = contact.geom
-            self._mujoco.mj_contactForce(self._simulation.model, data, index, wrench)
-            force = contact.frame.reshape(3, 3).T @ wrench[:3]  # from the first on the second
-            forces[points.index(second if second in points else first)] += force if second in points else -force
+        contact, points = self._data.contact, self._simulation.points
+        forces, first = np.zeros((points.size, 3)), contact.efc_address
+        acts = first >= 0
+        if acts.any():  # a cone's rows are the normal force and the two along the ground
+            local = self._data.efc_force[first[acts, None] + np.arange(3)]
+            world = np.einsum("ci,cix->cx", local, contact.frame[acts].reshape(-1, 3, 3))  # on the second geom
+            of_points = contact.geom[acts, :, None] == points  # (acting, 2, contacts)
+            signs = of_points[:, 1].astype(float) - of_points[:, 0]
+            forces = signs.T @ world
         return forces
 
 

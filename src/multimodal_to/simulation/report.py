@@ -12,10 +12,6 @@ from multimodal_to.simulation.playback import Playback
 from multimodal_to.simulation.stabiliser import rotation_vector
 from multimodal_to.trajectory import Array, Trajectory
 
-FALL_TILT = 45.0
-"""A base turned away from the plan by more than this has fallen [°]."""
-FALL_DEPTH = 0.25
-"""A CoM lower than the plan by more than this has fallen [m]."""
 TOUCHING = 5.0
 """A foot that bears more than this stands [N]."""
 BLINK = 0.1
@@ -60,8 +56,6 @@ def tracking(playback: Playback) -> Tracking:
     ])  # fmt: skip
     joints = np.degrees(np.abs(playback.qpos[:, 7:] - reference.joints))[during].max(axis=0)
     thrust = np.abs(playback.thrust - reference.thrust)[during]
-    down = (attitude > FALL_TILT) | (reference.com[:, 2] - playback.com[:, 2] > FALL_DEPTH)
-    fell = float(playback.time[np.argmax(down)]) if down.any() else None
     return Tracking(
         com=float(com[during].max()),
         attitude=float(attitude[during].max()),
@@ -70,15 +64,15 @@ def tracking(playback: Playback) -> Tracking:
         thrust=float(thrust.max(initial=0.0)),
         switches=_switches(playback),
         torque_over_effort=float((np.abs(playback.torques).max(axis=0) / robot.joint_limits.effort).max()),
-        fell=fell,
-        end=_end(playback, fell),
+        fell=playback.fell,
+        end=_end(playback),
         com_at_end=float(com[-1]),
         attitude_at_end=float(attitude[-1]),
     )
 
 
-def _end(playback: Playback, fell: float | None) -> str:
-    if fell is not None:
+def _end(playback: Playback) -> str:
+    if playback.fell is not None:
         return "fell"
     last = playback.contact_forces[-100:, :, 2].sum(axis=1).mean()
     if last > TOUCHING:

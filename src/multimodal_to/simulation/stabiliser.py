@@ -7,11 +7,13 @@ Wanted is a change of the momentum's rate, with starred the plan and I the robot
 Each of three stages takes what the one before leaves, by least squares: z minimises ‖W (A z − Δ)‖² + ‖z / σ‖².
 
 1. Thrusts, which are slow. A jet whose throttle is at its end keeps the thrust that it has.
-2. Forces at the contact points that the plan loads and that touch; they stay inside the friction pyramid.
+2. Forces at the contact points that the plan loads, of feet that stand; they stay inside the friction pyramid.
 3. Joints between base and jets, which turn and shift the thrusts. They count the less the more the feet carry.
 
 In flight Δ is about the CoM, and R* leans towards the wanted horizontal force, as a quadrotor's does. While a foot
 stands, stages 1 and 3 look only at the moment about the planned centre of pressure: about it the ground cannot help.
+Of that they get what a stance as wide as the planned one leaves, B Δ of `_unborne`. Two feet side by side bear a moment
+that rolls the robot: thrusts that fight them only shift the load to one foot, and are out of trim when it leaves.
 """
 
 from __future__ import annotations
@@ -29,12 +31,13 @@ from multimodal_to.trajectory import Array
 
 COM_STIFFNESS, COM_DAMPING = 6.0, 5.0  # K_x [1/s²], D_x [1/s]
 ATTITUDE_STIFFNESS, ATTITUDE_DAMPING = 16.0, 8.0  # K_R [1/s²], D_h [1/s]
+RADIUS = 0.08  # r: a stance bears half of a moment about an axis from which its points stand so far [m]
 LEAN_MAX = 0.05  # [rad]
 THRUST_SPREAD = 20.0  # σ of a thrust [N]
 LOAD_SPREAD = 0.5  # σ of a contact force, as a share of the planned load of its point [1]
 JOINT_SPREAD = 0.1  # σ of a joint in flight [rad]
 JOINT_MAX = 0.3  # how far a joint leaves the plan [rad]
-LOADED = 1.0  # a contact point that the plan loads with more counts as one that stands [N]
+LOADED = 1.0  # a foot that the plan loads with more, and that touches, stands [N]
 # Weights of the horizontal forces, the vertical one [1/N], and the moments [1/(N m)].
 THRUST_WEIGHTS = np.array([0.3, 0.3, 1.0, 5.0, 5.0, 5.0])
 FORCE_WEIGHTS = np.array([1.0, 1.0, 1.0, 5.0, 5.0, 5.0])
@@ -77,27 +80,30 @@ def correct(
     robot = simulation.robot
     com, points = data.subtree_com[1], data.geom_xpos[simulation.points]
     loads = np.maximum(plan.contact_forces[step][:, 2], 0.0)
-    standing = np.flatnonzero((loads > LOADED) & np.isin(simulation.points, data.contact.geom))
-    load = float(loads[standing].sum())
+    same_foot = np.array([[one.foot == other.foot for other in robot.contacts] for one in robot.contacts])
+    touches = same_foot @ np.isin(simulation.points, data.contact.geom)
+    standing = np.flatnonzero((same_foot @ loads > LOADED) & touches)
+    stands, load = bool(standing.size), float(loads[standing].sum())
     free = max(0.0, 1.0 - load / robot.weight)
     wanted = _wanted(simulation, data, plan, step, inertia, free)
 
-    origin = loads[standing] @ points[standing] / load if standing.size else com
-    rows = _MOMENTS if standing.size else np.ones(6)
-    about = wanted.copy()
-    about[3:] += np.cross(com - origin, wanted[:3])
-    thrust, missing = _thrusts(simulation, data, about, origin, turbines, plan.thrust[step], THRUST_WEIGHTS * rows)
+    origin = loads[standing] @ points[standing] / load if stands else com
+    rows = _MOMENTS if stands else np.ones(6)
+    whole = _about(origin, com, wanted)
+    asked = whole.copy()
+    if stands:
+        asked[3:] = _unborne(points[standing] - origin, loads[standing] / load) @ whole[3:]
+    thrust, missing = _thrusts(simulation, data, asked, origin, turbines, plan.thrust[step], THRUST_WEIGHTS * rows)
 
     forces = np.zeros((len(robot.contacts), 3))
-    if standing.size:
-        lacking = missing.copy()
-        lacking[3:] += np.cross(origin - com, missing[:3])
+    if stands:
+        lacking = _about(com, origin, missing + whole - asked)
         forces[standing] = _contact_forces(
             plan.contact_forces[step][standing], points[standing] - com, lacking, friction
         )
     joints = np.zeros(len(robot.joint_names))
     if robot.jets and free > 0.0:
-        effect = _effect_of_joints(simulation, data, origin, turbines.thrust, stands=bool(standing.size))
+        effect = _effect_of_joints(simulation, data, origin, turbines.thrust, stands=stands)
         joints = _ridge(effect, missing, np.full(joints.size, free * JOINT_SPREAD), JOINT_WEIGHTS * rows)
     return Correction(thrust=thrust, contact_forces=forces, joints=np.clip(joints, -JOINT_MAX, JOINT_MAX))
 
@@ -122,6 +128,20 @@ def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, 
     turn = lean + rotation_vector(plan.rotation[step] @ data.xmat[1].reshape(3, 3).T)  # both small
     spin = plan.angular_momentum[step] - data.subtree_angmom[1]
     return np.concatenate([linear, ATTITUDE_STIFFNESS * inertia @ turn + ATTITUDE_DAMPING * spin])
+
+
+def _about(origin: Array, before: Array, wrench: Array) -> Array:
+    """Return a wrench about `origin` that is given about `before`, (6,)."""
+    return np.concatenate([wrench[:3], wrench[3:] + _skew(before - origin) @ wrench[:3]])
+
+
+def _unborne(arms: Array, shares: Array) -> Array:
+    """Return B = r² (C + r² 1)⁻¹, (3, 3): which part of a moment a stance leaves to others.
+
+    C = Σ share_i (a_i × e_j) · (a_i × e_k) is how far loaded points stand from each axis through their middle [m²].
+    """
+    spread = sum(share * _skew(arm).T @ _skew(arm) for arm, share in zip(arms * [1.0, 1.0, 0.0], shares, strict=True))
+    return np.asarray(RADIUS**2 * np.linalg.inv(spread + RADIUS**2 * np.eye(3)))
 
 
 def _axes(simulation: SimulationModel, data: Any) -> Array:

@@ -1,0 +1,40 @@
+"""Another motion of the same robot in the same scene, faint: a plan behind what a simulation made of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multimodal_to.errors import InputError
+from multimodal_to.models.robot import Robot
+from multimodal_to.replay.bodies import draw_links, draw_visuals, drawn, faded, link_paths, link_poses
+from multimodal_to.replay.scene import Scene, shapes
+from multimodal_to.replay.visuals import Appearance
+from multimodal_to.resampling import resample
+from multimodal_to.trajectory import Trajectory
+
+GHOST_OPACITY = 0.35
+GHOST_COLOUR = 0x7A3FB5
+
+
+def in_step(trajectory: Trajectory, ghost: Trajectory) -> Trajectory:
+    """Return a ghost at the knots of the motion that it goes with, both from their start; it waits at its ends.
+
+    Raises:
+        InputError: the ghost is not one of the same robot.
+    """
+    if (ghost.robot, ghost.joint_names) != (trajectory.robot, trajectory.joint_names):
+        raise InputError(
+            f"the motion to show with it is of '{ghost.robot}' with {len(ghost.joint_names)} joints; "
+            f"expected '{trajectory.robot}' with the same {len(trajectory.joint_names)} joints"
+        )
+    times = ghost.time[0] + trajectory.time - trajectory.time[0]
+    return resample(ghost, np.clip(times, ghost.time[0], ghost.time[-1]))
+
+
+def draw_ghost(scene: Scene, robot: Robot, ghost: Trajectory, look: Appearance) -> None:
+    """Draw the robot faint as it moves in the ghost, which is in step, and the way of its CoM."""
+    paths = link_paths(robot, look, "ghost/robot")
+    draw_links(scene, paths, link_poses(robot, ghost, paths))
+    draw_visuals(scene, paths, faded({visual: drawn(visual) for visual in look.visuals}, GHOST_OPACITY))
+    way = shapes.Line(shapes.PointsGeometry(ghost.com_position), shapes.LineBasicMaterial(color=GHOST_COLOUR))
+    scene.add("ghost/com_trace", way, None, np.eye(4))
