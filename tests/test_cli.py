@@ -122,6 +122,7 @@ def completions(line, folder):
         ("multimodal-to solve m", ["mine.toml"]),
         ("multimodal-to doctor s", ["step-up"]),
         ("multimodal-to show j", ["jump", "jump.npz"]),
+        ("multimodal-to solve jump --linear-solver m", ["mumps", "ma27", "ma57", "ma77", "ma86", "ma97"]),
         ("multimodal-to reproduce take-off st", ["step-up"]),
         ("multimodal-to plot a.npz --figure m", ["momentum", "margins"]),
         ("multimodal-to export a.npz --to m", ["mat", "mujoco"]),
@@ -196,6 +197,14 @@ def test_progress_names_iteration_objective_violation_and_time(stopped):
 def test_quiet_prints_nothing(tmp_path):
     result = run("solve", "take-off", "--output", tmp_path, "--max-iterations", 1, "--quiet")
     assert (result.stdout, result.stderr) == ("", "")
+
+
+def test_a_solve_without_pictures_writes_the_trajectory_alone_and_says_what_factorised(tmp_path):
+    few = ("--set", "knots=5", "--set", "interval_max=1.0", "--max-iterations", 1)
+    result = run("solve", "take-off", *few, "--linear-solver", "mumps", "--no-pictures", "--output", tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["trajectory.npz"]
+    assert re.search(r", built in .* s, linear solver mumps$", result.stdout, re.MULTILINE)
+    assert Trajectory.load(tmp_path / "trajectory.npz").solve_record()["linear_solver"] == "mumps"
 
 
 def test_plot_and_replay_read_a_saved_file(file, tmp_path):
@@ -281,6 +290,8 @@ def test_bare_arrays_are_audited_once_their_robot_is_named(file, tmp_path):
         (("solve", "none.toml"), "cannot read 'none.toml'"),
         (("solve", "take-off", "--robot", "ironcup"), "unknown robot 'ironcup'; did you mean 'ironcub'?"),
         (("solve", "take-off", "--max-iterations", "0"), "max_iterations is 0; expected a positive number"),
+        (("solve", "jump", "--linear-solver", "ma96"), "unknown linear solver 'ma96'; did you mean 'ma"),
+        (("solve", "jump", "--linear-solver", "pardisomkl"), "the linear solver 'pardisomkl' cannot be used"),
         (("plot", "none.npz"), "no trajectory file 'none.npz'"),
         (("plot", "none.npz", "--figure", "force"), "unknown figure 'force'; did you mean 'forces'?"),
         (("replay", "none.npz", "--gif", "film.mp4"), "no trajectory file"),

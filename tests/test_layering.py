@@ -33,7 +33,7 @@ FLOORS = [
 OCP_FLOORS = [
     {"scenario"},
     {"scenario_data"},
-    {"variables", "integrators"},
+    {"variables", "integrators", "linear_solvers"},
     {"gait", "naming"},
     {"constraints", "guess"},
     {"costs", "boundary"},

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from multimodal_to.export import EXPORTS
 from multimodal_to.models.robot import bundled_robots
+from multimodal_to.ocp.linear_solvers import AUTO, LINEAR_SOLVERS
 from multimodal_to.scenarios import SCENARIOS
 
 
@@ -34,6 +35,11 @@ def robots_or_folders(incomplete: str) -> list[str]:
 def robots_or_urdfs(incomplete: str) -> list[str]:
     """Return the bundled robots, and the URDF files and folders that start so."""
     return _starting(bundled_robots(), incomplete) + _paths(incomplete, (".urdf",))
+
+
+def linear_solvers(incomplete: str) -> list[str]:
+    """Return the linear solvers that start so, here or not."""
+    return _starting((AUTO, *LINEAR_SOLVERS), incomplete)
 
 
 def figures(incomplete: str) -> list[str]:

@@ -34,6 +34,7 @@ from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.ocp import Ipopt, Relaxation, Solution, build, relax
 from multimodal_to.ocp import solve as run_solver
+from multimodal_to.ocp.linear_solvers import AUTO, LINEAR_SOLVERS, choose
 from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.ocp.scenario_data import stored, to_dict
 from multimodal_to.scenario_files import change, to_toml
@@ -147,11 +148,16 @@ def solve(
             autocompletion=completion.robots_or_folders,
         ),
     ] = "",
-    max_iterations: Annotated[int, typer.Option(help="Give up after so many iterations.")] = 1000,
-    time_limit: Annotated[float, typer.Option(help="Give up after so many seconds in the solver.")] = 3600.0,
-    warm_start: Annotated[
-        Path | None, typer.Option(help="Trajectory of a task much like this one to start from, for a faster answer.")
-    ] = None,
+    max_iterations: Annotated[int, typer.Option(help="Most iterations.")] = 1000,
+    time_limit: Annotated[float, typer.Option(help="Most seconds in the solver.")] = 3600.0,
+    linear_solver: Annotated[
+        str,
+        typer.Option(
+            help=f"{LINEAR_SOLVERS[0]}, {LINEAR_SOLVERS[1]}, pardiso, or one of HSL such as ma57.",
+            autocompletion=completion.linear_solvers,
+        ),
+    ] = AUTO,
+    warm_start: Annotated[Path | None, typer.Option(help="Trajectory of a similar task to start from.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Try a task that the doctor calls hopeless.")] = False,
     resume: Annotated[
         Path | None, typer.Option(help="Checkpoint or trajectory of an unfinished solve to go on from, beside it.")
@@ -159,9 +165,8 @@ def solve(
     checkpoint: Annotated[
         bool, typer.Option(help="Keep the best iterate in checkpoint.npz while the solve runs.")
     ] = True,
-    explain: Annotated[
-        bool, typer.Option("--explain", help="Where there is no answer, find out which rows have to give way.")
-    ] = False,
+    explain: Annotated[bool, typer.Option("--explain", help="Without an answer: which rows give way.")] = False,
+    no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Write no plot and no replay page.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Solve a scenario; write the trajectory, its plot and its replay page.
@@ -174,7 +179,9 @@ def solve(
     Example: multimodal-to solve --resume results/take-off/checkpoint.npz
     """
     task = given(name, settings, robot, warm_start=warm_start, resume=resume)
-    scenario, solver = task.scenario, Ipopt(max_iterations=max_iterations, time_limit=time_limit)
+    scenario = task.scenario
+    solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit, linear_solver=linear_solver)
+    chosen_solver = choose(linear_solver)  # before anything takes time
     console = Console(highlight=False, markup=False, emoji=False, quiet=quiet)
     the_robot = load_robot(task.robot)
     _refuse_hopeless(examine(the_robot, scenario), console, force)
@@ -184,7 +191,8 @@ def solve(
     the_robot = problem.robot  # with the jets that the scenario uses
     console.print(
         f"{scenario.title}: {the_robot.name}, {scenario.knots} knots, {problem.lower.size} variables, "
-        f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s",
+        f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s, "
+        f"linear solver {chosen_solver.name}",
         soft_wrap=True,
     )
     expectation = expect(scenario) if task.start is None else None
@@ -200,7 +208,7 @@ def solve(
     _summarise(console, solution, report)
     if explain and not solution.status.solved and not progress.interrupted:
         _explain(console, relax(problem, solution.trajectory, solver))
-    if not progress.interrupted:  # who stops a solve does not want to wait for pictures
+    if not (no_pictures or progress.interrupted):  # who stops a solve does not want to wait for pictures
         written += _draw(the_robot, solution.trajectory, folder)
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)

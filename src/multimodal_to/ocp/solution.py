@@ -96,7 +96,7 @@ def solve(
     Raises:
         InputError: the start is a motion of another robot.
         TrajectoryError: what the start says of how it was solved is no JSON object.
-        SolverError: the solver could not be run.
+        SolverError: the solver could not be run, or its linear solver is not here.
     """
     solver = solver or Ipopt()
     started, iterations = time.perf_counter(), 0
@@ -170,6 +170,7 @@ def _run(
     opti = problem.opti
     options: dict[str, Any] = {
         "print_time": False,
+        "record_time": True,
         "detect_simple_bounds": True,
         "jac_g": problem.nlp.jacobian,
         "grad_f": problem.nlp.gradient,

@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Any
 
 from multimodal_to.errors import InputError
+from multimodal_to.ocp import linear_solvers
 
 
 class Status(Enum):
@@ -76,14 +77,14 @@ class Phase(Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class Ipopt:
-    """IPOPT with MUMPS: a monotone barrier on exact derivatives, in two phases.
+    """IPOPT: a monotone barrier on exact derivatives, in two phases.
 
     The rough phase leaves the curvature of the rows out of the Hessian. What is left is convex, so that a step takes
     one factorisation and is long, and a start guess that meets hardly any row becomes a motion that nearly meets them.
     The exact phase goes on from there.
 
     Raises:
-        InputError: an option is out of its range.
+        InputError: an option is out of its range, or there is no linear solver of that name.
     """
 
     tolerance: float = 1e-4  # on the scaled optimality conditions
@@ -101,20 +102,26 @@ class Ipopt:
     """
     barrier_start: float = 0.1
     barrier_warm: float = 1e-3  # where a solve that starts from an answer begins
+    linear_solver: str = linear_solvers.AUTO
+    """What factorises, one of `linear_solvers.LINEAR_SOLVERS`: by default an HSL solver that works, or MUMPS."""
+    hsl_library: str = ""  # file of the HSL library; empty: looked for
 
     def __post_init__(self) -> None:
-        for name in self.__dataclass_fields__:
+        linear_solvers.check(self.linear_solver, self.hsl_library)
+        for name in self.__dataclass_fields__.keys() - {"linear_solver", "hsl_library"}:
             if not getattr(self, name) > 0:
                 raise InputError(f"{name} is {getattr(self, name)}; expected a positive number")
 
     def options(self, iterations: int, seconds: float, phase: Phase) -> dict[str, Any]:
-        """Return IPOPT's own options for a phase within a budget."""
+        """Return IPOPT's own options for a phase within a budget.
+
+        Raises:
+            SolverError: the linear solver is not here, or does not work.
+        """
         options: dict[str, Any] = {
             "print_level": 0,
             "sb": "yes",
-            "linear_solver": "mumps",
-            "mumps_pivtol": 1e-8,
-            "mumps_mem_percent": 50,  # of what it expects; by default it takes ten times that anew at each iteration
+            **linear_solvers.choose(self.linear_solver, self.hsl_library).options(),
             "fast_step_computation": "yes",
             "mu_strategy": "monotone",
             "mu_init": self.barrier_warm if phase is Phase.WARM else self.barrier_start,
