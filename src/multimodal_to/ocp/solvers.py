@@ -108,9 +108,10 @@ class Ipopt:
 
     def __post_init__(self) -> None:
         linear_solvers.check(self.linear_solver, self.hsl_library)
-        for name in self.__dataclass_fields__.keys() - {"linear_solver", "hsl_library"}:
-            if not getattr(self, name) > 0:
-                raise InputError(f"{name} is {getattr(self, name)}; expected a positive number")
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            if not isinstance(value, str) and not value > 0:
+                raise InputError(f"{name} is {value}; expected a positive number")
 
     def options(self, iterations: int, seconds: float, phase: Phase) -> dict[str, Any]:
         """Return IPOPT's own options for a phase within a budget.
