@@ -11,7 +11,7 @@ import pytest
 from multimodal_to import scenarios
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.terrain import HeightField
-from multimodal_to.ocp import Terminal, Weights, build, transcription
+from multimodal_to.ocp import Terminal, Weights, build
 from multimodal_to.ocp.variables import Layout
 
 ALL = {
@@ -22,14 +22,7 @@ ALL = {
 
 
 @pytest.fixture(scope="module")
-def undamped():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(transcription, "PRODUCT_DAMPING", 0.0)
-        yield
-
-
-@pytest.fixture(scope="module")
-def problem(ironcub, undamped):
+def problem(ironcub):
     weights = Weights(**ALL, joint_velocities={"legs": 3.0, "arms": 5.0})
     return build(ironcub, replace(scenarios.take_off(), knots=3, weights=weights))
 
@@ -75,7 +68,7 @@ def test_the_hessian_is_the_derivative_of_the_gradient_of_the_lagrangian(problem
     assert np.abs(computed - expected).max() < 1e-6 * np.abs(expected).max()
 
 
-def test_derivatives_are_exact_on_terrain_and_with_the_second_order_cone(ironcub, undamped):
+def test_derivatives_are_exact_on_terrain_and_with_the_second_order_cone(ironcub):
     """Points are spread over a bumpy field; the Jacobian against the rows, the Hessian against the Jacobian."""
     field = HeightField.sampled(
         lambda x, y: 0.1 * np.sin(3 * x + y), x_range=(-0.8, 0.8), y_range=(-0.8, 0.8), spacing=0.3
@@ -164,24 +157,3 @@ def test_violations_are_reported_by_name_in_their_own_units(problem):
     x[index] = 5.0
     assert problem.largest_violations(x)["bounds of thrust"] == pytest.approx(500.0 - 160.0)
     assert problem.unit("bounds of thrust") == "N"
-
-
-def test_damping_lifts_the_curvature_of_products_and_of_nothing_else(ironcub, problem, point):
-    """With all of it a product of length and force has no negative curvature left; other rows keep theirs."""
-    x, _ = point
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(transcription, "PRODUCT_DAMPING", 1.0)
-        damped = build(ironcub, problem.scenario)
-    for name, is_product in (("complementarity", True), ("sliding", True), ("momentum_dynamics", False)):
-        multipliers = np.zeros(problem.row_lower.size)
-        index = problem.rows[name].index
-        multipliers[index] = np.random.default_rng(9).normal(size=index.size)
-        exact, lifted = (
-            np.array(cs.triu2symm(some.nlp.hessian(x, [], 0.0, multipliers))) for some in (problem, damped)
-        )
-        least = np.linalg.eigvalsh(lifted).min()
-        if is_product:
-            assert np.linalg.eigvalsh(exact).min() < -1e-3
-            assert least > -1e-9 * np.abs(lifted).max()
-        else:
-            assert np.array_equal(exact, lifted)

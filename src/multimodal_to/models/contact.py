@@ -64,11 +64,11 @@ def friction_cone(surface: Surface, point: SX, force: SX, friction: float) -> SX
 FRICTION = {FrictionCone.PYRAMID: friction_pyramid, FrictionCone.SECOND_ORDER: friction_cone}
 
 
-def complementarity_factors(surface: Surface, point: SX, force: SX) -> tuple[SX, SX]:
-    """Return d(p) [m] and n(p)ᵀ f [N]: their product is zero when no force acts on a point in the air (eq. 10)."""
-    return surface.distance(point), normal_force(surface, point, force)
+def complementarity(surface: Surface, point: SX, force: SX) -> SX:
+    """Return d(p) n(p)ᵀ f [N m]: zero when no force acts on a point in the air (eq. 10)."""
+    return surface.distance(point) * normal_force(surface, point, force)
 
 
-def sliding_factors(surface: Surface, point: SX, force: SX, displacement: SX) -> tuple[SX, SX]:
-    """Return t(p)ᵀ Δp [m] and n(p)ᵀ f [N], (2, 1) each: their products are zero when a loaded point stays (eq. 11)."""
-    return surface.tangents(point).T @ displacement, cs.repmat(normal_force(surface, point, force), 2, 1)
+def sliding(surface: Surface, point: SX, force: SX, displacement: SX) -> SX:
+    """Return t(p)ᵀ Δp n(p)ᵀ f [N m], (2, 1): zero when a loaded point stays where it is (eq. 11)."""
+    return surface.tangents(point).T @ displacement * normal_force(surface, point, force)

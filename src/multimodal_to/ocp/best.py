@@ -68,17 +68,13 @@ class Best:
         """Keep what a solve starts from, so that it ends with nothing worse."""
         self._keep(self._evaluated(x, 0, phase))
 
-    def show(self, x: Array, rows: Array, objective: float, iteration: int, phase: Phase) -> float:
-        """Keep an iterate, with its rows g(x), if it is better than the one kept, and see to the checkpoint.
-
-        Returns its violation.
-        """
+    def show(self, x: Array, rows: Array, objective: float, iteration: int, phase: Phase) -> None:
+        """Keep an iterate, with its rows g(x), if it is better than the one kept, and see to the checkpoint."""
         self.seen += 1
         violation = self._problem.scaled_violation(x, rows)
         self._keep(Kept(x=x, iteration=iteration, phase=phase, objective=objective, violation=violation))
         if self._checkpoint is not None and self._kept is not None:
             self._checkpoint.update(self._problem, self._kept, iteration)
-        return violation
 
     def end(self, x: Array, iteration: int, phase: Phase, *, answer: bool) -> Kept:
         """Return what a solve ends with: the solver's last x if that is an answer, else the best iterate."""

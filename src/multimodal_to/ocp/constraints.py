@@ -59,8 +59,6 @@ class Rows:
     upper: float
     unit: str
     scale: float = 1.0
-    factors: tuple[SX, SX] | None = None
-    """Of rows that are products: lengths [m] and forces [N], (m, 1) each, which the solver's Hessian wants to know."""
     of: str = "robot"  # "robot", "joint", "contact" or "jet": what the rows are repeated for
     components: tuple[str, ...] = ()  # the name of each row among them, as `stages` gives it
 
@@ -127,11 +125,13 @@ def friction_cone(knot: Knot, world: World) -> Rows:
 
 def complementarity(knot: Knot, world: World) -> Rows:
     """d(p_i) n·f_i ≤ ε_n (eq. 20)."""
-    factors = [
-        contact.complementarity_factors(world.surface, point, force)
+    products = [
+        contact.complementarity(world.surface, point, force)
         for point, force in zip(knot.points, knot.forces, strict=True)
     ]
-    return _products(factors, -np.inf, world.complementarity_max)
+    return Rows(
+        expression=cs.vertcat(*products), lower=-np.inf, upper=world.complementarity_max, unit="N m", of="contact"
+    )
 
 
 def contact_reach(knot: Knot, world: World) -> Rows:
@@ -222,17 +222,13 @@ def sliding(start: Knot, end: Knot, dt: SX, world: World) -> Rows:
 
     The force is the one that acts over the interval: under backward Euler its end's.
     """
-    factors = [
-        contact.sliding_factors(world.surface, after, force, after - before)
+    products = [
+        contact.sliding(world.surface, after, force, after - before)
         for before, after, force in zip(start.points, end.points, end.forces, strict=True)
     ]
-    return _products(factors, -world.sliding_max, world.sliding_max)
-
-
-def _products(factors: list[tuple[SX, SX]], lower: float, upper: float) -> Rows:
-    """Return rows that are products of lengths and forces; each pair's two columns multiply element by element."""
-    lengths, forces = (cs.vertcat(*column) for column in zip(*factors, strict=True))
-    return Rows(expression=lengths * forces, lower=lower, upper=upper, unit="N m", factors=(lengths, forces))
+    return Rows(
+        expression=cs.vertcat(*products), lower=-world.sliding_max, upper=world.sliding_max, unit="N m", of="contact"
+    )
 
 
 def _thrust_acceleration(knot: Knot, world: World) -> SX:

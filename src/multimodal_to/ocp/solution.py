@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import time
 from collections.abc import Callable
@@ -111,8 +110,7 @@ def solve(
         seconds = max(solver.time_limit - (time.perf_counter() - started), 1e-3)
         left = max(solver.max_iterations - iterations, 1)
         options = solver.options(left, seconds, phase)
-        enough = solver.rough_violation if phase is Phase.ROUGH else -math.inf
-        watcher = _Watcher(problem, best, progress, started, iterations, phase, enough)
+        watcher = _Watcher(problem, best, progress, started, iterations, phase)
         try:
             x, statistics = _run(problem, x, options, watcher, phase)
         except SolverError as error:
@@ -123,8 +121,6 @@ def solve(
         iterations += int(statistics["iter_count"])
         message = str(statistics["return_status"])
         status = Ipopt.status(message)
-        if watcher.reached and not (watcher.stopped or watcher.interrupts.asked):
-            continue  # on to the next phase
         if status in (Status.TIME_LIMIT, Status.STOPPED) or iterations >= solver.max_iterations:
             break
     end = best.end(x, iterations, phase, answer=status.solved)
@@ -212,15 +208,12 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
     """CasADi's iteration callback: shows every iterate to `best`, tells `progress`, and stops the solve when asked."""
 
     def __init__(
-        self, problem: Problem, best: Best, progress: Progress | None, started: float, iteration: int, phase: Phase,
-        enough: float,
-    ) -> None:  # fmt: skip
+        self, problem: Problem, best: Best, progress: Progress | None, started: float, iteration: int, phase: Phase
+    ) -> None:
         cs.Callback.__init__(self)
         self._problem, self._best, self._progress = problem, best, progress
         self._started, self._iteration, self._phase = started, iteration, phase
-        self._enough, self.reached = enough, False  # the violation at which the phase has done its work
         self._rows_first: bool | None = None
-        self.stopped = False  # on request of `progress`
         self.interrupts = Interrupts()
         self.error: Exception | None = None
         self.construct("watcher")
@@ -254,16 +247,15 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
         x, objective, iteration = values["x"].full().ravel(), float(values["f"]), self._iteration
         rows = self._rows(x, values["g"])
         self._iteration += 1
-        self.reached = self._best.show(x, rows, objective, iteration, self._phase) <= self._enough
+        self._best.show(x, rows, objective, iteration, self._phase)
         if self._progress is None:
-            return self.reached
+            return False
         violations = self._problem.largest_violations(x, rows)
         worst = max(violations, key=violations.__getitem__)
-        self.stopped = bool(self._progress(Iterate(
+        return bool(self._progress(Iterate(
             iteration=iteration, objective=objective, worst=worst, violation=violations[worst],
             unit=self._problem.unit(worst), elapsed=time.perf_counter() - self._started,
         )))  # fmt: skip
-        return self.stopped or self.reached
 
     def _rows(self, x: Array, g: cs.DM) -> Array:
         """Return the rows at x, without evaluating them again where CasADi hands them over.

@@ -55,13 +55,12 @@ _IPOPT_STATUS = {
 }
 
 
-_BOUND_PUSHES = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
-_PUSH = {"rough": 0.1, "exact": 1e-4, "warm": 1e-6}
-"""How far the start of each phase is moved inside its bounds, in solver units and as a share of their distance.
+_ROUGH_PUSH = 0.1
+"""How far the start guess is moved inside its bounds, in solver units and as a share of their distance."""
 
-A start guess far, so that it is free to move; what the rough phase has found little, so that it is not lost; and an
-answer, which touches its bounds, hardly at all.
-"""
+
+_WARM_PUSH = 1e-6
+"""The same for an answer to start from, which touches its bounds."""
 
 
 class Phase(Enum):
@@ -91,9 +90,7 @@ class Ipopt:
     violation_tolerance: float = 1e-7  # on the rows, in solver units
     max_iterations: int = 1000
     time_limit: float = math.inf  # wall time [s]
-    rough_iterations: int = 35  # at most
-    rough_violation: float = 3e-3
-    """The rough phase ends where no row is missed by more, in solver units: what follows is no longer its strength."""
+    rough_iterations: int = 20
     objective_scale: float = 1e-4
     """What the objective is multiplied by: it brings weights of 1e4 to 1e7, as the paper has them, near one.
 
@@ -136,7 +133,10 @@ class Ipopt:
         }
         if math.isfinite(seconds):
             options["max_wall_time"] = seconds
-        options |= dict.fromkeys(_BOUND_PUSHES, _PUSH[phase.value])
+        if phase is Phase.ROUGH:
+            options |= dict.fromkeys(("bound_push", "bound_frac"), _ROUGH_PUSH)
+        if phase is Phase.WARM:
+            options |= dict.fromkeys(("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"), _WARM_PUSH)
         return options
 
     @staticmethod

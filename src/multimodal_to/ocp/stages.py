@@ -17,7 +17,7 @@ from multimodal_to.ocp.boundary import END_ROWS, START_ROWS
 from multimodal_to.ocp.constraints import IntervalRows, KnotRows, Rows, World
 from multimodal_to.ocp.naming import components
 from multimodal_to.ocp.scenario import Scenario, Weights
-from multimodal_to.ocp.transcription import Family, Stage
+from multimodal_to.ocp.transcription import Stage
 from multimodal_to.ocp.variables import INTERVAL_SCALE, Bounds, Knot, Layout
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ def collect(world: World, scenario: Scenario, layout: Layout, bounds: Bounds) ->
                 start=z,
                 end=z_next,
                 interval=dt,
-                families=tuple(_family(some) for _, some in rows[name]),
+                families=tuple(some.expression / some.scale for _, some in rows[name]),
                 costs=cs.vertcat(cs.SX(0, 1), *charged[name].values()),
             ),
             rows=rows[name],
@@ -92,14 +92,6 @@ def collect(world: World, scenario: Scenario, layout: Layout, bounds: Bounds) ->
         for name, starts in {"first": first, "every": every, "last": last}.items()
         if rows[name] or charged[name]
     ]
-
-
-def _family(rows: Rows) -> Family:
-    """Return rows in solver units."""
-    if rows.factors is None:
-        return Family(rows=rows.expression / rows.scale)
-    lengths, forces = rows.factors
-    return Family(rows=rows.expression / rows.scale, factors=(lengths / rows.scale, forces))
 
 
 def _named(functions: Sequence[Callable[..., Rows]], *arguments: Any) -> list[tuple[str, Rows]]:

@@ -23,23 +23,6 @@ Integers = NDArray[np.int64]
 THREADS = min(os.cpu_count() or 1, 4)
 """Threads that evaluate the stages; what comes out doesn't depend on their number."""
 
-PRODUCT_DAMPING = 0.1
-"""How much of what would make the Hessian of a product of length and force positive semidefinite is added to it [1].
-
-A relaxed contact is λ a b with a length a and a force b, an indefinite saddle. λ a b + |λ| (r a² + b²/r)/2 is none for
-any r > 0, and with r = |b|/|a| it keeps its curvature along a b = const. All of it makes steps short, nothing of it
-makes IPOPT factorise again and again to find how much it lacks; a tenth spares most of that and costs no iterations.
-"""
-_SMALL_LENGTH, _SMALL_FORCE = 1e-4, 1.0  # added to |a| [m] and |b| [N] in r, in the root of squares
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Family:
-    """The rows of one name."""
-
-    rows: SX  # (m, 1), scaled
-    factors: tuple[SX, SX] | None = None  # (m, 1) each, lengths and forces, where the rows are their products
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage:
@@ -50,7 +33,7 @@ class Stage:
     start: SX  # z_k, (size, 1)
     end: SX  # z_k+1, (size, 1)
     interval: SX  # Δt, (1, 1)
-    families: tuple[Family, ...]
+    families: tuple[SX, ...]  # the rows by name, (m_i, 1) each, scaled
     costs: SX  # (c, 1), one per name, weighted
 
     @cached_property
@@ -60,7 +43,7 @@ class Stage:
     @cached_property
     def rows(self) -> SX:
         """Return all rows, (m, 1)."""
-        return cs.vertcat(cs.SX(0, 1), *(family.rows for family in self.families))
+        return cs.vertcat(cs.SX(0, 1), *self.families)
 
     @property
     def repeats(self) -> int:
@@ -87,7 +70,7 @@ class Stage:
 
         Each family is derived on its own: together they would share directions, at twice the operations.
         """
-        blocks = [cs.jacobian(family.rows, self._arguments) for family in self.families]
+        blocks = [cs.jacobian(rows, self._arguments) for rows in self.families]
         return self._nonzeros("jacobian", cs.vertcat(cs.SX(0, self._arguments.shape[0]), *blocks))
 
     def gradient(self) -> tuple[cs.Function, cs.Sparsity]:
@@ -95,29 +78,11 @@ class Stage:
         return self._nonzeros("gradient", cs.sparsify(cs.gradient(cs.sum1(self.costs), self._arguments)))
 
     def hessian(self) -> tuple[cs.Function, cs.Sparsity]:
-        """Return (z, z⁺, Δt, σ, λ) → nonzeros of the upper Hessian of σ Σ costs + λᵀ rows, damped, and their places."""
+        """Return (z, z⁺, Δt, σ, λ) → nonzeros of the upper Hessian of σ Σ costs + λᵀ rows, and their places."""
         sigma, multipliers = cs.SX.sym("sigma"), cs.SX.sym("lambda", self.rows.shape[0])
         lagrangian = sigma * cs.sum1(self.costs) + cs.dot(multipliers, self.rows)
-        exact, _ = cs.hessian(lagrangian, self._arguments)
-        upper = cs.triu(exact + PRODUCT_DAMPING * self._damping(multipliers))
+        upper = cs.triu(cs.hessian(lagrangian, self._arguments)[0])
         return self._nonzeros("hessian", upper, sigma, multipliers)
-
-    def _damping(self, multipliers: SX) -> SX:
-        """Return the Hessian of Σ |λ| (r a² + b²/r)/2 over all products a b, with |λ| and r held."""
-        size, first = self._arguments.shape[0], 0
-        total = cs.SX(size, size)
-        for family in self.families:
-            count = family.rows.shape[0]
-            weight = cs.fabs(multipliers[first : first + count])
-            first += count
-            if family.factors is None:
-                continue
-            lengths, forces = family.factors
-            ratio = cs.sqrt((forces**2 + _SMALL_FORCE**2) / (lengths**2 + _SMALL_LENGTH**2))
-            for factor, share in ((lengths, weight * ratio), (forces, weight / ratio)):
-                slope = cs.jacobian(factor, self._arguments)
-                total += slope.T @ cs.diag(share) @ slope
-        return total
 
     def cost_hessian(self) -> tuple[cs.Function, cs.Sparsity]:
         """Return (z, z⁺, Δt, σ) → nonzeros of the upper Hessian of σ Σ costs alone, and their places."""
