@@ -88,6 +88,15 @@ def test_feasible_beats_infeasible_then_the_objective_counts(problem):
     assert not kept(np.nan, 1.0).finite
 
 
+@pytest.fixture
+def ctrl_c():
+    """Python's own handling of Ctrl-C, which is ignored where the tests run in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_in_a_script_ends_the_solve_and_what_it_found_is_returned(problem):
     def press(iterate):
         if iterate.iteration == 25:
