@@ -83,6 +83,9 @@ def simulate(
     stabilise: Annotated[
         bool, typer.Option(help="Let a small stabiliser correct thrusts, contact forces and joints.")
     ] = True,
+    delay: Annotated[
+        float, typer.Option(help="How far the motion follows the forces, from 0 to 1 intervals of the plan.")
+    ] = 0.0,
     robot: RobotOption = "",
 ) -> None:
     """Play a trajectory back in MuJoCo, say how far it gets, and write what happened as a trajectory.
@@ -102,7 +105,7 @@ def simulate(
         "along the plan": simulation.disagreement(the_robot, simulation.states_along(plan)),
     }
     writable(target.parent)
-    playback = simulation.play(the_robot, plan, stabilise=stabilise)
+    playback = simulation.play(the_robot, plan, stabilise=stabilise, delay=delay)
     outcome = simulation.tracking(playback)
     for where, difference in agreement.items():
         out.print(f"inverse dynamics {where}: MuJoCo and RNEA differ by {difference:.1e} of the largest force",

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from multimodal_to.errors import TrajectoryError
+from multimodal_to.errors import InputError, TrajectoryError
 from multimodal_to.models.jet import Jet
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
@@ -51,15 +51,19 @@ class Playback:
     fell: float | None  # when [s]
 
 
-def play(robot: Robot, plan: Trajectory, *, stabilise: bool = True) -> Playback:
+def play(robot: Robot, plan: Trajectory, *, stabilise: bool = True, delay: float = 0.0) -> Playback:
     """Play a plan back on the ground and with the friction of the scenario that it keeps.
 
-    Without `stabilise` only the joints' servos close a loop, and turbines get the planned throttle.
+    Without `stabilise` only the joints' servos close a loop, and turbines get the planned throttle. The motion follows
+    thrusts, contact forces and torques by `delay` intervals of the plan, as `reference` says.
 
     Raises:
         OutputError: MuJoCo is not installed.
+        InputError: the delay is not from 0 to 1.
         TrajectoryError: the plan is not one of this robot with these jets.
     """
+    if not 0.0 <= delay <= 1.0:
+        raise InputError(f"the delay is {delay:g} intervals; expected 0 to 1")
     names = ((robot.joint_names, plan.joint_names), (robot.contact_names, plan.contact_names),
              (robot.jet_names, plan.jet_names))  # fmt: skip
     if any(ours != theirs for ours, theirs in names):
@@ -71,13 +75,15 @@ def play(robot: Robot, plan: Trajectory, *, stabilise: bool = True) -> Playback:
         robot, FlatGround() if scenario is None else scenario.surface, friction, middle=(low + high) / 2.0,
         reach=float((high - low).max()) / 2.0 + REACH,
     )  # fmt: skip
-    return _Player(simulation, plan, friction, stabilise).run()
+    return _Player(simulation, plan, friction, stabilise, delay).run()
 
 
 class _Player:
     """A simulation that runs, with everything that changes as it does."""
 
-    def __init__(self, simulation: SimulationModel, plan: Trajectory, friction: float, stabilise: bool) -> None:
+    def __init__(
+        self, simulation: SimulationModel, plan: Trajectory, friction: float, stabilise: bool, delay: float
+    ) -> None:
         self._mujoco = mujoco_module()
         self._simulation, self._plan, self._robot = simulation, plan, simulation.robot
         self._friction, self._stabilise = friction, stabilise
@@ -85,7 +91,7 @@ class _Player:
         self._time: Array = np.asarray(
             TIME_STEP * np.arange(round((plan.duration + HOLD) / TIME_STEP) + 1), dtype=float
         )
-        self._reference = reference(self._robot, plan, self._time)
+        self._reference = reference(self._robot, plan, self._time, delay)
         self._inertia = _inertia(self._robot)
         self._thrust, self._rate = plan.thrust[:, 0].copy(), plan.thrust_rate[:, 0].copy()
         self._throttle, self._shift = plan.throttle[:, 0].copy(), np.zeros(len(self._robot.joint_names))

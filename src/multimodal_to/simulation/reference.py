@@ -29,35 +29,46 @@ class Reference:
     throttle: Array  # u [%], (steps, jets)
 
 
-def reference(robot: Robot, plan: Trajectory, times: Array) -> Reference:
+def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) -> Reference:
     """Return a plan at times since its start [s].
 
     Backward Euler holds the velocity of knot k over the interval that ends there, so velocities are read half an
-    interval later than positions; its throttle is held as well.
+    interval later than positions; its throttle is held as well. So the velocity changes from that of knot k to that of
+    k + 1 about t_k, when it is the forces of knot k + 1 that change it: with a `delay` of one interval the whole motion
+    is read that much earlier than thrusts, contact forces and torques, and accelerates when they act.
     """
     knots = plan.time - plan.time[0]
-    half = plan.duration / plan.knots / 2.0
-    moving = (times <= plan.duration).astype(float)[:, None]
+    interval = plan.duration / plan.knots
+    own = times - delay * interval  # of the motion
+    moving = ((own >= 0.0) & (own <= plan.duration)).astype(float)[:, None]
+    spooling = (times <= plan.duration).astype(float)[:, None]
 
-    def at(values: Array, delay: float = 0.0) -> Array:
-        rows = [np.interp(times + delay, knots, row) for row in values]
+    def at(values: Array, when: Array) -> Array:
+        rows = [np.interp(when, knots, row) for row in values]
         return np.array(rows).reshape(len(values), times.size).T
 
-    inside = np.minimum(times[times <= plan.duration] + plan.time[0], plan.time[-1])
-    rotations = base_poses(resample(plan, inside))[:, :3, :3]
+    def rate(values: Array) -> Array:
+        return np.asarray(at(values, own + interval / 2.0) * moving)
+
     torques = generalised_forces(robot, plan)[6:]
     torques[:, 0] = torques[:, 1]  # a trajectory doesn't tell the accelerations of its first knot
     held = np.minimum(np.searchsorted(knots, times - 1e-9), plan.knots)
     return Reference(
-        com=at(plan.com_position),
-        com_velocity=at(plan.com_velocity, half) * moving,
-        angular_momentum=at(plan.angular_momentum, half) * moving,
-        rotation=np.concatenate([rotations, np.repeat(rotations[-1:], times.size - len(rotations), axis=0)]),
-        joints=at(plan.joint_positions),
-        joint_velocities=at(plan.joint_velocities, half) * moving,
-        torques=at(torques),
-        contact_forces=at(plan.contact_forces).reshape(times.size, -1, 3),
-        thrust=at(plan.thrust),
-        thrust_rate=at(plan.thrust_rate) * moving,
+        com=at(plan.com_position, own),
+        com_velocity=rate(plan.com_velocity),
+        angular_momentum=rate(plan.angular_momentum),
+        rotation=_rotations(plan, own),
+        joints=at(plan.joint_positions, own),
+        joint_velocities=rate(plan.joint_velocities),
+        torques=at(torques, times),
+        contact_forces=at(plan.contact_forces, times).reshape(times.size, -1, 3),
+        thrust=at(plan.thrust, times),
+        thrust_rate=at(plan.thrust_rate, times) * spooling,
         throttle=plan.throttle[:, held].T,
     )
+
+
+def _rotations(plan: Trajectory, times: Array) -> Array:
+    """Return the base's rotation at times since the start, that of start and end before and after, (steps, 3, 3)."""
+    distinct, places = np.unique(np.clip(plan.time[0] + times, plan.time[0], plan.time[-1]), return_inverse=True)
+    return np.asarray(base_poses(resample(plan, distinct))[places, :3, :3])
