@@ -3,8 +3,9 @@
     python benchmarks/simulation.py [SCENARIO | TRAJECTORY.npz ...] [--trials 0] [--seed 1]
 
 A bundled scenario, by its name, is solved first with default options; a trajectory file is played back as it is. Each
-is played back with the stabiliser and without. Trials repeat the playback with the stabiliser's gains and spreads drawn
-each within ±20 %, and tell how many end as a plan should and within what errors: whether the outcome hangs by a thread.
+is played back with the stabiliser, also with a motion that follows its forces by one interval, and without it. Trials
+repeat the playback with the stabiliser's gains and spreads drawn each within ±20 %, and tell how many end as a plan
+should and within what errors: whether the outcome hangs by a thread.
 """
 
 from __future__ import annotations
@@ -36,9 +37,10 @@ def plan_of(name: str) -> Trajectory:
     return mt.solve(mt.build(mt.load_robot("ironcub"), scenario)).trajectory
 
 
-def playback(plan: Trajectory, *, stabilise: bool = True) -> Tracking:
+def playback(plan: Trajectory, *, stabilise: bool = True, delay: float = 0.0) -> Tracking:
     """Return what comes of a plan."""
-    return tracking(play(mt.load_robot(plan.robot).with_jets(plan.jet_names), plan, stabilise=stabilise))
+    robot = mt.load_robot(plan.robot).with_jets(plan.jet_names)
+    return tracking(play(robot, plan, stabilise=stabilise, delay=delay))
 
 
 @contextmanager
@@ -70,6 +72,12 @@ def ended(outcome: Tracking) -> str:
     return outcome.end if outcome.fell is None else f"falls at {outcome.fell:.1f} s"
 
 
+def in_short(outcome: Tracking) -> str:
+    """Return how a playback ended, with its errors where it survived."""
+    survived = f", {100 * outcome.com:.1f} cm and {outcome.attitude:.1f}°" if outcome.end in SURVIVES else ""
+    return ended(outcome) + survived
+
+
 def main() -> None:
     """Print the table, a row as soon as it is known."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -78,16 +86,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="of the other gains")
     options = parser.parse_args()
     console = Console(highlight=False, soft_wrap=True, markup=False)
-    titles = ["plan", "knots", "CoM", "tilt", "joints", "switch", "end", "without stabiliser"]
+    titles = ["plan", "knots", "CoM", "tilt", "joints", "switch", "end", "delay of 1", "without stabiliser"]
     titles += [f"{options.trials} with other gains"] if options.trials else []
     console.print(f"| {' | '.join(titles)} |\n|{' -- |' * len(titles)}")
     for name in options.plans:
         plan = plan_of(name)
-        bare = playback(plan, stabilise=False)
-        bare_errors = f", {100 * bare.com:.1f} cm and {bare.attitude:.1f}°" if bare.end in SURVIVES else ""
         row = [plan.scenario if name.endswith(".npz") else Path(name).stem,
                f"{plan.knots} of {plan.duration / plan.knots:.2f} s", *errors(playback(plan)),
-               ended(bare) + bare_errors]  # fmt: skip
+               in_short(playback(plan, delay=1.0)), in_short(playback(plan, stabilise=False))]  # fmt: skip
         if options.trials:
             rng, outcomes = np.random.default_rng(options.seed), []
             for _ in range(options.trials):

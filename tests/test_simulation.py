@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from multimodal_to.adam.urdf import read_urdf
-from multimodal_to.errors import OutputError, TrajectoryError
+from multimodal_to.errors import InputError, OutputError, TrajectoryError
 from multimodal_to.models.terrain import FlatGround, Plane, Stairs, frame_function
 from multimodal_to.resampling import resample
 from multimodal_to.simulation import (
@@ -23,6 +23,7 @@ from multimodal_to.simulation import (
     tracking,
 )
 from multimodal_to.simulation.model import POINT_RADIUS
+from multimodal_to.simulation.reference import reference
 from multimodal_to.simulation.stabiliser import _ridge, _unborne, rotation_vector
 from synthetic import take_off as synthetic_take_off
 
@@ -188,3 +189,21 @@ def test_a_scenario_with_less_friction_reaches_the_simulator(ironcub):
     model = build_model(ironcub, FlatGround(), 0.1).model
     assert model.geom("ground").friction[0] == 0.1
     assert model.geom(ironcub.contact_names[0]).friction[0] == 0.1
+
+
+def test_with_a_delay_the_motion_follows_its_forces(ironcub):
+    plan = synthetic_take_off(ironcub)
+    interval = plan.duration / plan.knots
+    times = np.linspace(0.0, plan.duration, 41)
+    own, late = reference(ironcub, plan, times), reference(ironcub, plan, times + interval, delay=1.0)
+    for name in ("com", "com_velocity", "rotation", "joints", "joint_velocities", "angular_momentum"):
+        np.testing.assert_allclose(getattr(late, name)[:-1], getattr(own, name)[:-1], atol=1e-9)
+    at_once = reference(ironcub, plan, times, delay=1.0)
+    for name in ("contact_forces", "thrust", "torques", "throttle"):
+        np.testing.assert_array_equal(getattr(at_once, name), getattr(own, name))
+    assert np.abs(own.com - at_once.com).max() > 0.01
+
+
+def test_a_delay_is_at_most_an_interval(ironcub):
+    with pytest.raises(InputError, match=r"the delay is 1\.5 intervals; expected 0 to 1"):
+        play(ironcub, synthetic_take_off(ironcub), delay=1.5)

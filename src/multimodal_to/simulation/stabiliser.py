@@ -31,7 +31,7 @@ from multimodal_to.trajectory import Array
 
 COM_STIFFNESS, COM_DAMPING = 6.0, 5.0  # K_x [1/s²], D_x [1/s]
 ATTITUDE_STIFFNESS, ATTITUDE_DAMPING = 16.0, 8.0  # K_R [1/s²], D_h [1/s]
-RADIUS = 0.1  # r: a stance bears half of a moment about an axis from which its points stand so far [m]
+RADIUS = 0.08  # r: a stance bears half of a moment about an axis from which its points stand so far [m]
 LEAN_MAX = 0.05  # [rad]
 THRUST_SPREAD = 20.0  # σ of a thrust [N]
 LOAD_SPREAD = 0.5  # σ of a contact force, as a share of the planned load of its point [1]
