@@ -159,6 +159,7 @@ def _phases(start: Trajectory | None) -> tuple[Phase, ...]:
 
 
 @machine.one_blas_thread()
+@machine.memory_kept()
 def _run(
     problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher, phase: Phase
 ) -> tuple[Array, dict[str, Any]]:

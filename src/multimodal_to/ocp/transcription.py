@@ -201,8 +201,11 @@ class _Blocks:
     def matrix(self, height: int, width: int) -> cs.MX:
         """Return the (height, width) sum of all blocks."""
         keys = np.concatenate(self._columns) * height + np.concatenate(self._rows)
-        places, index = np.unique(keys, return_inverse=True)
+        places, first, index = np.unique(keys, return_index=True, return_inverse=True)
         starts = np.searchsorted(places, height * np.arange(width + 1))
         pattern = cs.Sparsity(height, width, starts.tolist(), (places % height).tolist())
+        values = cs.vertcat(*self._values)
+        if places.size == keys.size:
+            return cs.MX(pattern, values[first.tolist()])
         adder = cs.Sparsity(places.size, keys.size, list(range(keys.size + 1)), index.tolist())
-        return cs.MX(pattern, cs.mtimes(cs.DM(adder, np.ones(keys.size)), cs.vertcat(*self._values)))
+        return cs.MX(pattern, cs.mtimes(cs.DM(adder, np.ones(keys.size)), values))
