@@ -92,7 +92,9 @@ def test_the_derivatives_of_the_relaxed_problem_are_those_of_its_functions(too_h
     random = np.random.default_rng(0)
     chosen = np.sort(random.choice(too_high.row_lower.size, 50, replace=False))
     start = too_high.guess
-    functions = elastic._derivatives(too_high, chosen, start)
+    nlp, functions = elastic._relaxed(too_high, chosen, start)
+    rows_at = cs.Function("rows", [nlp["x"]], [nlp["g"]])
+    objective = cs.Function("objective", [nlp["x"]], [nlp["f"]])
     y = np.concatenate([start + 0.01 * random.normal(size=start.size), random.uniform(size=100)])
     way, lam, h = random.normal(size=y.size), random.normal(size=too_high.row_lower.size), 1e-6
 
@@ -101,8 +103,13 @@ def test_the_derivatives_of_the_relaxed_problem_are_those_of_its_functions(too_h
         return 2.0 * np.array(functions["grad_f"](at, [])[1]).ravel() + np.array(cs.mtimes(jacobian.T, lam)).ravel()
 
     jacobian = functions["jac_g"](y, [])[1]
-    rows = [np.array(functions["jac_g"](y + sign * h * way, [])[0]).ravel() for sign in (1, -1)]
+    assert np.array_equal(functions["jac_g"](y, [])[0].full(), rows_at(y).full())
+    rows = [np.array(rows_at(y + sign * h * way)).ravel() for sign in (1, -1)]
     assert np.allclose(cs.mtimes(jacobian, way).full().ravel(), (rows[0] - rows[1]) / (2 * h), rtol=1e-5, atol=1e-4)
+    value, gradient = functions["grad_f"](y, [])
+    assert float(value) == float(objective(y))
+    slope = float(objective(y + h * way) - objective(y - h * way)) / (2 * h)
+    assert float(cs.dot(gradient, way)) == pytest.approx(slope, rel=1e-5)
     upper = functions["hess_lag"](y, [], 2.0, lam)
     hessian = upper + cs.triu(upper, False).T
     turned = (lagrangian_gradient(y + h * way) - lagrangian_gradient(y - h * way)) / (2 * h)

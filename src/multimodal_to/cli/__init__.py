@@ -12,15 +12,13 @@ from importlib.metadata import version
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.text import Text
 
 # They register their commands, in this order.
 # isort: off
 from multimodal_to.cli import solving, showing, judging  # noqa: F401
 
 # isort: on
-from multimodal_to.cli.common import app, out, remove_unused
+from multimodal_to.cli.common import app, out, remove_unused, say
 from multimodal_to.errors import MultimodalError
 
 __all__ = ["app", "main"]
@@ -32,7 +30,7 @@ def main() -> None:
     try:
         app()
     except MultimodalError as error:
-        _say("error", "bold red", str(error))
+        say("error", "bold red", str(error))
         sys.exit(2)
 
 
@@ -53,9 +51,4 @@ def _options(
 
 
 def _show_warning(message: Warning | str, *_: object) -> None:
-    _say("warning", "yellow", str(message))
-
-
-def _say(what: str, style: str, sentence: str) -> None:
-    """Print to the standard error, with colour where it is a terminal."""
-    Console(stderr=True, highlight=False).print(Text.assemble((f"{what}: ", style), sentence), soft_wrap=True)
+    say("warning", "yellow", str(message))

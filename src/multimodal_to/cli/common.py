@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.text import Text
 
 from multimodal_to.audit import Audit
 from multimodal_to.cli.completion import robots_or_folders, scenarios_or_files
@@ -127,3 +128,8 @@ def described(report: Audit) -> str:
         f"{report.duration:.2f} s, longest flight {report.airborne:.2f} s, vertical thrust at the end "
         f"{100 * report.final_thrust_over_weight:.2f} % of the weight"
     )
+
+
+def say(what: str, style: str, sentence: str) -> None:
+    """Print to the standard error, with colour where it is a terminal."""
+    Console(stderr=True, highlight=False).print(Text.assemble((f"{what}: ", style), sentence), soft_wrap=True)

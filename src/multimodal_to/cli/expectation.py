@@ -11,7 +11,7 @@ from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.scenarios import SCENARIOS
 
 TYPICAL_ITERATIONS: Mapping[str, int] = MappingProxyType(
-    {"take-off": 94, "take-off-and-landing": 157, "landing": 101, "walk-to-fly": 187, "jump": 109, "step-up": 170}
+    {"take-off": 94, "take-off-and-landing": 157, "landing": 101, "walk-to-fly": 178, "jump": 98, "step-up": 183}
 )
 """Iterations of the bundled scenarios in the run of `reproduce` that README's table shows."""
 

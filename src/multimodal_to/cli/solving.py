@@ -23,6 +23,7 @@ from multimodal_to.cli.common import (
     chosen,
     described,
     out,
+    say,
     writable,
 )
 from multimodal_to.cli.expectation import expect
@@ -86,7 +87,7 @@ def show(
     scenario = stored(Trajectory.load(name)) if name.endswith(".npz") else chosen(name, None)
     if scenario is None:
         raise ScenarioError(f"'{name}' keeps no scenario")
-    out.print(to_toml(change(scenario, settings or ())), markup=False, soft_wrap=True, end="")
+    out.print(to_toml(change(scenario, settings or ())), soft_wrap=True, end="")
 
 
 @app.command()
@@ -115,7 +116,7 @@ def doctor(
         typer.echo(json.dumps(data, indent=2, ensure_ascii=False))
     else:
         for finding in diagnosis.findings:
-            out.print(f"{finding.severity.value}: {finding}", markup=False, soft_wrap=True)
+            out.print(f"{finding.severity.value}: {finding}", soft_wrap=True)
         verdict = "refused" if diagnosis.hopeless else "nothing found that makes it hopeless"
         counts = ", ".join(f"{severity.value}s: {len(diagnosis.of(severity))}" for severity in Severity)
         out.print(f"{name}: {verdict} ({counts})", soft_wrap=True)
@@ -126,9 +127,9 @@ def _refuse_hopeless(diagnosis: Diagnosis, console: Console, force: bool) -> Non
     """Print warnings, and errors to standard error; leave with exit status 2 after errors unless forced to go on."""
     errors = diagnosis.of(Severity.ERROR)
     for finding in errors:
-        Console(stderr=True, highlight=False).print(f"error: {finding}", markup=False, soft_wrap=True)
+        say("error", "bold red", str(finding))
     for finding in diagnosis.of(Severity.WARNING):
-        console.print(f"warning: {finding}", markup=False, soft_wrap=True)
+        console.print(f"warning: {finding}", soft_wrap=True)
     if errors and not force:
         raise typer.Exit(2)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.task import Task
 from multimodal_to.errors import MultimodalError
+from multimodal_to.ocp import naming
 from multimodal_to.ocp.problem import formulate
 from multimodal_to.ocp.stages import NamedStage
 from multimodal_to.ocp.variables import Bounds, Layout
@@ -62,7 +63,8 @@ def _unseen(task: Task, layout: Layout, bounds: Bounds, stages: list[NamedStage]
     lost = []
     for name, rows in layout.rows.items():
         free = (bounds.lower[name] < bounds.upper[name]).any(axis=1)
-        lost += [f"{name} of {_label(task, name, int(index))}" for index in np.flatnonzero(~seen[rows] & free)]
+        components = naming.components(task.robot, QUANTITIES[name].of, free.size)
+        lost += [f"{name} of '{components[index]}'" for index in np.flatnonzero(~seen[rows] & free)]
     if lost:
         yield warning(
             "unseen variables",
@@ -81,10 +83,3 @@ def _dependencies(named: NamedStage, size: int) -> Iterator[tuple[NDArray[np.int
     rows, columns = (np.array(part, dtype=np.int64) for part in function.jac_sparsity(0, 0).get_triplet())
     for index, name in enumerate(names):
         yield np.unique(columns[rows == index] % size), name.endswith(_INTEGRATION)
-
-
-def _label(task: Task, name: str, index: int) -> str:
-    """Return what a component of a variable belongs to."""
-    robot, quantity = task.robot, QUANTITIES[name]
-    bodies = {"joint": robot.joint_names, "contact": robot.contact_names, "jet": robot.jet_names}.get(quantity.of)
-    return f"'{bodies[index // quantity.rows]}'" if bodies else f"component {index}"

@@ -72,24 +72,21 @@ def relax(
 
 
 @machine.one_blas_thread()
+@machine.memory_kept()
 def _run(
     problem: Problem, chosen: NDArray[np.int64], start: Array, solver: Ipopt
 ) -> tuple[Array, Array, dict[str, Any]]:
     """Solve the relaxed problem; return x, s⁺ + s⁻ of the chosen rows, and the solver's statistics."""
-    count, rows, elastic = start.size, problem.row_lower.size, chosen.size
+    count, elastic = start.size, chosen.size
     own = replace(solver, objective_scale=1.0, tolerance=1e-6)
+    nlp, derivatives = _relaxed(problem, chosen, start)
     options = {
         "print_time": False,
         "error_on_fail": False,
         "ipopt": own.options(solver.max_iterations, solver.time_limit, Phase.EXACT),
-        **_derivatives(problem, chosen, start),
+        **derivatives,
     }
-    y = cs.MX.sym("y", count + 2 * elastic)
-    x, up, down = y[:count], y[count : count + elastic], y[count + elastic :]
-    spread = cs.DM(cs.Sparsity(rows, elastic, list(range(elastic + 1)), chosen.tolist()), 1.0)
-    objective = cs.sum1(up) + cs.sum1(down) + 0.5 * _NEARNESS * cs.sumsqr(x - start)
-    g = problem.nlp.rows(x) + cs.mtimes(spread, up - down)
-    function = cs.nlpsol("relaxed", "ipopt", {"x": y, "f": objective, "g": g}, options)
+    function = cs.nlpsol("relaxed", "ipopt", nlp, options)
     at_start = problem.rows_at(start)[chosen]
     result = function(
         x0=np.concatenate([
@@ -105,25 +102,31 @@ def _run(
     return values[:count], np.abs(slacks), dict(function.stats())
 
 
-def _derivatives(problem: Problem, chosen: NDArray[np.int64], start: Array) -> dict[str, cs.Function]:
-    """Return the relaxed problem's derivatives: the problem's own, with ±1 for each slack and κ on the diagonal."""
+def _relaxed(
+    problem: Problem, chosen: NDArray[np.int64], start: Array
+) -> tuple[dict[str, cs.MX], dict[str, cs.Function]]:
+    """Return the relaxed problem in (x, s⁺, s⁻) and its derivatives, by CasADi's names.
+
+    The derivatives are the problem's own, with ±1 for each slack and κ on the diagonal.
+    """
     count, rows, elastic = start.size, problem.row_lower.size, chosen.size
     y, p = cs.MX.sym("y", count + 2 * elastic), cs.MX.sym("p", 0)
     factor, multipliers = cs.MX.sym("lam_f"), cs.MX.sym("lam_g", rows)
-    x, slacks = y[:count], y[count:]
+    x, up, down = y[:count], y[count : count + elastic], y[count + elastic :]
     spread = cs.DM(cs.Sparsity(rows, elastic, list(range(elastic + 1)), chosen.tolist()), 1.0)
-    objective = cs.sum1(slacks) + 0.5 * _NEARNESS * cs.sumsqr(x - start)
+    added = cs.mtimes(spread, up - down)
+    objective = cs.sum1(up) + cs.sum1(down) + 0.5 * _NEARNESS * cs.sumsqr(x - start)
     gradient = cs.vertcat(_NEARNESS * (x - start), cs.DM.ones(2 * elastic))
     g, jacobian = problem.nlp.jacobian(x, p)
-    relaxed = g + cs.mtimes(spread, slacks[:elastic] - slacks[elastic:])
     curvature = problem.nlp.hessian(x, p, 0.0, multipliers) + factor * _NEARNESS * cs.MX.eye(count)
     hessian = cs.diagcat(curvature, cs.MX(2 * elastic, 2 * elastic))
-    return {
+    derivatives = {
         "grad_f": cs.Function("nlp_grad_f", [y, p], [objective, gradient], ["x", "p"], ["f", "grad_f_x"]),
         "jac_g": cs.Function(
-            "nlp_jac_g", [y, p], [relaxed, cs.horzcat(jacobian, spread, -spread)], ["x", "p"], ["g", "jac_g_x"]
+            "nlp_jac_g", [y, p], [g + added, cs.horzcat(jacobian, spread, -spread)], ["x", "p"], ["g", "jac_g_x"]
         ),
         "hess_lag": cs.Function(
             "nlp_hess_l", [y, p, factor, multipliers], [hessian], ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]
         ),
     }
+    return {"x": y, "f": objective, "g": problem.nlp.rows(x) + added}, derivatives
