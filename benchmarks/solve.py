@@ -5,7 +5,8 @@
 A scenario is the name of a bundled one or a TOML file. A run solves it as the command line does without pictures, in a
 process of its own, and then from Python: built, solved from its plain start guess, and solved again from that answer
 for a target that is 2 cm higher: the height at mid-horizon where the scenario asks for one, otherwise that of the end.
-How an iteration's time is split is that of the last phase, the exact one.
+How an iteration's time is split is that of the last phase, the exact one. Where there is a C compiler, the derivatives
+are compiled at the end, into a folder of this run, and the first solve is repeated with them.
 
 * `--tight` goes on from an answer with a hundredth of the tolerance: how far its objective is above the converged one.
 * `--reference` runs `paper_reference.py` too, for the scenarios that it has: `full` to its end, which takes half an
@@ -29,14 +30,17 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import multimodal_to as mt
 from multimodal_to.machine import versions
+from multimodal_to.ocp import compiled
 from multimodal_to.scenario_files import load
 
 HIGHER = 0.02  # by so much the target of the warm solve [m]
@@ -87,7 +91,7 @@ def peak_memory() -> float:
 
 def command(name: str) -> Figures:
     """Run the whole command without pictures; it must end with an answer."""
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, empty_cache():
         arguments = ["solve", name, "--quiet", "--no-pictures", "--output", folder]
         started = time.perf_counter()
         ended = subprocess.run([sys.executable, "-m", "multimodal_to", *arguments], check=False)
@@ -97,8 +101,16 @@ def command(name: str) -> Figures:
     return {"command, cold [s]": spent, "command, peak memory [MB]": peak, "command has an answer": solved}
 
 
+@contextmanager
+def empty_cache() -> Iterator[None]:
+    """Let this process and its children find no compiled functions but their own."""
+    with tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, {compiled.CACHE_VARIABLE: folder}):
+        yield
+
+
+@empty_cache()
 def library(name: str) -> Figures:
-    """Build, solve and solve again from the answer in this process."""
+    """Build, solve, solve again from the answer, and solve with compiled derivatives, in this process."""
     robot, scenario = mt.load_robot("ironcub"), scenario_of(name)
     started = time.perf_counter()
     problem = mt.build(robot, scenario)
@@ -113,7 +125,24 @@ def library(name: str) -> Figures:
         "peak memory [MB]": peak, "status": cold.status.value, **judged(problem, cold),
         "warm solve [s]": warm.solve_time, "warm iterations": warm.iterations, "warm status": warm.status.value,
         **{f"warm {key}": value for key, value in judged(warm_problem, warm).items()},
+        **with_compiled(robot, scenario),
     }  # fmt: skip
+
+
+def with_compiled(robot: mt.Robot, scenario: mt.Scenario) -> Figures:
+    """Compile the derivatives, build with them and solve."""
+    started = time.perf_counter()
+    try:
+        mt.precompile(robot, scenario)
+    except mt.MultimodalError as error:
+        return {"compiled": str(error)}
+    spent = time.perf_counter() - started
+    started = time.perf_counter()
+    problem = mt.build(robot, scenario)
+    built = time.perf_counter() - started
+    solution = mt.solve(problem)
+    return {"compiling [s]": spent, "compiled build [s]": built, "compiled solve [s]": solution.solve_time,
+            "compiled iterations": solution.iterations, "compiled objective": solution.objective}  # fmt: skip
 
 
 def judged(problem: mt.Problem, solution: mt.Solution) -> Figures:

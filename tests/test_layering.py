@@ -33,7 +33,7 @@ FLOORS = [
 OCP_FLOORS = [
     {"scenario"},
     {"scenario_data"},
-    {"variables", "integrators", "linear_solvers"},
+    {"variables", "integrators", "linear_solvers", "compiled"},
     {"gait", "naming"},
     {"constraints", "guess"},
     {"costs", "boundary"},

@@ -13,7 +13,20 @@ from multimodal_to.errors import MultimodalError
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.models.terrain import FlatGround, HeightField, Plane, Stairs
-from multimodal_to.ocp import Ipopt, Problem, Scenario, Solution, Start, Status, Terminal, Weights, build, relax, solve
+from multimodal_to.ocp import (
+    Ipopt,
+    Problem,
+    Scenario,
+    Solution,
+    Start,
+    Status,
+    Terminal,
+    Weights,
+    build,
+    precompile,
+    relax,
+    solve,
+)
 from multimodal_to.trajectory import Trajectory
 
 __all__ = [
@@ -40,6 +53,7 @@ __all__ = [
     "build",
     "doctor",
     "load_robot",
+    "precompile",
     "relax",
     "scenario_files",
     "scenarios",

@@ -2,7 +2,7 @@
 
 from multimodal_to.ocp.elastic import Relaxation, relax
 from multimodal_to.ocp.misses import Miss
-from multimodal_to.ocp.problem import Problem, build
+from multimodal_to.ocp.problem import Problem, build, precompile
 from multimodal_to.ocp.scenario import Scenario, Start, Terminal, Weights
 from multimodal_to.ocp.solution import Iterate, Solution, solve
 from multimodal_to.ocp.solvers import Ipopt, Status
@@ -20,6 +20,7 @@ __all__ = [
     "Terminal",
     "Weights",
     "build",
+    "precompile",
     "relax",
     "solve",
 ]

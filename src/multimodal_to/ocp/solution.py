@@ -58,7 +58,7 @@ class Solution:
     feasible: bool
     misses: tuple[Miss, ...] = field(repr=False)  # families of rows and bounds that are not met, the worst first
     solve_time: float  # wall time in the solver [s]
-    statistics: dict[str, Any] = field(repr=False)  # the solver's own, `threads` and `versions`
+    statistics: dict[str, Any] = field(repr=False)  # the solver's own, `compiled`, `threads` and `versions`
 
     @property
     def largest_violation(self) -> tuple[str, float, str]:
@@ -101,7 +101,7 @@ def solve(
     started, iterations = time.perf_counter(), 0
     x = problem.guess if start is None else problem.start_from(start)
     phases = _phases(start)
-    environment = _environment(solver)
+    environment = _environment(problem, solver)
     best = Best(problem, None if checkpoint is None else Checkpoint(checkpoint, environment))
     if start is not None:
         best.seed(x, phases[0])
@@ -142,12 +142,15 @@ def solve(
     )  # fmt: skip
 
 
-def _environment(solver: Ipopt) -> dict[str, Any]:
-    """Return what the answer depends on beside the problem."""
+def _environment(problem: Problem, solver: Ipopt) -> dict[str, Any]:
+    """Return what the answer depends on beside what is asked."""
     options = solver.options(solver.max_iterations, solver.time_limit, Phase.EXACT)
     with machine.one_blas_thread():
         threads = machine.threads()
-    return {"linear_solver": options["linear_solver"], "threads": threads, "versions": machine.versions()}
+    return {
+        "linear_solver": options["linear_solver"], "compiled": problem.nlp.compiled, "threads": threads,
+        "versions": machine.versions(),
+    }  # fmt: skip
 
 
 def _phases(start: Trajectory | None) -> tuple[Phase, ...]:
@@ -164,7 +167,7 @@ def _run(
     problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher, phase: Phase
 ) -> tuple[Array, dict[str, Any]]:
     """Run IPOPT once from x; return where it ended, answer or not, and its statistics."""
-    opti = problem.opti
+    opti = problem.opti.copy()  # goes with its solver and memory when this solve ends
     options: dict[str, Any] = {
         "print_time": False,
         "record_time": True,

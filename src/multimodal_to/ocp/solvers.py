@@ -63,6 +63,10 @@ _WARM_PUSH = 1e-6
 """The same for an answer to start from, which touches its bounds."""
 
 
+_BARRIER_TOLERANCE = 50.0
+"""How loosely each barrier problem but the last is solved, in multiples of the barrier's parameter; IPOPT's own is 10."""
+
+
 class Phase(Enum):
     """What a run of the solver starts from, and with which Hessian."""
 
@@ -122,6 +126,7 @@ class Ipopt:
             **linear_solvers.choose(self.linear_solver, self.hsl_library).options(),
             "fast_step_computation": "yes",
             "mu_strategy": "monotone",
+            "barrier_tol_factor": _BARRIER_TOLERANCE,
             "mu_init": self.barrier_warm if phase is Phase.WARM else self.barrier_start,
             "tol": self.tolerance,
             "constr_viol_tol": self.violation_tolerance,

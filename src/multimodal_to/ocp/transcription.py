@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import SX
+from multimodal_to.ocp import compiled
 
 Integers = NDArray[np.int64]
 
@@ -90,6 +91,11 @@ class Stage:
         upper = cs.triu(cs.hessian(sigma * cs.sum1(self.costs), self._arguments)[0])
         return self._nonzeros("cost_hessian", upper, sigma)
 
+    def derivatives(self) -> tuple[cs.Function, ...]:
+        """Return the functions that nothing is derived of."""
+        pairs = (self.jacobian(), self.gradient(), self.hessian(), self.cost_hessian())
+        return tuple(function for function, _ in pairs)
+
     def _nonzeros(self, kind: str, matrix: SX, *more: SX) -> tuple[cs.Function, cs.Sparsity]:
         values = cs.vertcat(*matrix.nonzeros()) if matrix.nnz() else cs.SX(0, 1)
         return self._function(kind, values, *more), matrix.sparsity()
@@ -110,6 +116,11 @@ class Nlp:
     jacobian: cs.Function  # jac_g: (x, p) → g, ∂g/∂x
     hessian: cs.Function  # hess_lag: (x, p, λ_f, λ_g) → upper Hessian of the Lagrangian
     cost_hessian: cs.Function  # the same without the curvature of the rows
+
+    @property
+    def compiled(self) -> bool:
+        """Return whether the Hessian, the costliest of them, is machine code."""
+        return any(compiled.is_compiled(function) for function in self.hessian.find_functions())
 
 
 def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
@@ -135,17 +146,19 @@ def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
         rows.append(cs.vec(_mapped(stage.row_function(), stage.repeats)(*arguments)))
         costs.append(cs.sum2(_mapped(stage.cost_function(), stage.repeats)(*arguments)))
         function, pattern = stage.gradient()
-        gradients.add(_mapped(function, stage.repeats)(*arguments), places[pattern.row()], np.zeros_like(places[:1]))
+        gradients.add(
+            _derivative(function, stage.repeats)(*arguments), places[pattern.row()], np.zeros_like(places[:1])
+        )
         function, pattern = stage.jacobian()
         row, column = pattern.get_triplet()
-        jacobians.add(_mapped(function, stage.repeats)(*arguments), row_places[row], places[column])
+        jacobians.add(_derivative(function, stage.repeats)(*arguments), row_places[row], places[column])
         function, pattern = stage.hessian()
         row, column = pattern.get_triplet()
         sigmas = cs.repmat(factor, 1, stage.repeats)
-        hessians.add(_mapped(function, stage.repeats)(*arguments, sigmas, own), places[row], places[column])
+        hessians.add(_derivative(function, stage.repeats)(*arguments, sigmas, own), places[row], places[column])
         function, pattern = stage.cost_hessian()
         row, column = pattern.get_triplet()
-        cost_hessians.add(_mapped(function, stage.repeats)(*arguments, sigmas), places[row], places[column])
+        cost_hessians.add(_derivative(function, stage.repeats)(*arguments, sigmas), places[row], places[column])
 
     all_rows, all_costs = cs.vertcat(*rows), cs.vertcat(*costs)
     objective = cs.sum1(all_costs)
@@ -167,6 +180,11 @@ def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
 def _mapped(function: cs.Function, repeats: int) -> cs.Function:
     """Return a function of `repeats` columns, evaluated by `THREADS` at once; each column is what it would be alone."""
     return function if repeats == 1 else function.map(repeats, "thread", min(THREADS, repeats))
+
+
+def _derivative(function: cs.Function, repeats: int) -> cs.Function:
+    """Return the same for a function that is not derived again, which may be machine code."""
+    return _mapped(function if repeats == 1 else compiled.kept(function), repeats)
 
 
 def _hessian(x: cs.MX, p: cs.MX, factor: cs.MX, multipliers: cs.MX, matrix: cs.MX) -> cs.Function:
@@ -205,7 +223,9 @@ class _Blocks:
         starts = np.searchsorted(places, height * np.arange(width + 1))
         pattern = cs.Sparsity(height, width, starts.tolist(), (places % height).tolist())
         values = cs.vertcat(*self._values)
-        if places.size == keys.size:
-            return cs.MX(pattern, values[first.tolist()])
-        adder = cs.Sparsity(places.size, keys.size, list(range(keys.size + 1)), index.tolist())
-        return cs.MX(pattern, cs.mtimes(cs.DM(adder, np.ones(keys.size)), values))
+        again = np.setdiff1d(np.arange(keys.size), first, assume_unique=True)
+        total = values[first.tolist()]
+        if again.size:
+            adder = cs.Sparsity(places.size, again.size, list(range(again.size + 1)), index[again].tolist())
+            total += cs.mtimes(cs.DM(adder, np.ones(again.size)), values[again.tolist()])
+        return cs.MX(pattern, total)
