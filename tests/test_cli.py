@@ -297,6 +297,10 @@ def test_bare_arrays_are_audited_once_their_robot_is_named(file, tmp_path):
         (("replay", "none.npz", "--gif", "film.mp4"), "no trajectory file"),
         (("replay", "none.npz"), "no trajectory file 'none.npz'"),
         (("report", "none.npz"), "no trajectory file 'none.npz'"),
+        (
+            ("solve", "jump", "--set", "knots=10", "--set", 'allowances={"slip under loads" = 1.0}'),
+            "unknown property to allow more of 'slip under loads'; did you mean 'slip under load'?",
+        ),
         (("export", "none.npz", "--to", "matlab"), "unknown export 'matlab'; did you mean 'mat'?"),
         (("audit", "none.npz"), "no trajectory file 'none.npz'"),
         (("robot", "info", "none.urdf"), "unknown robot 'none.urdf'"),

@@ -37,6 +37,7 @@ from multimodal_to.ocp import Ipopt, Relaxation, Solution, build, relax
 from multimodal_to.ocp import precompile as compile_problem
 from multimodal_to.ocp import solve as run_solver
 from multimodal_to.ocp.linear_solvers import AUTO, LINEAR_SOLVERS, choose
+from multimodal_to.ocp.motion import motion
 from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.ocp.scenario_data import stored, to_dict
 from multimodal_to.scenario_files import change, to_toml
@@ -191,6 +192,8 @@ def solve(
     started = time.perf_counter()
     problem = build(the_robot, scenario)
     the_robot = problem.robot  # with the jets that the scenario uses
+    if scenario.allowances:
+        audit(the_robot, motion(problem, problem.guess), scenario)  # so that a wrong name ends here
     console.print(
         f"{scenario.title}: {the_robot.name}, {scenario.knots} knots, {problem.lower.size} variables, "
         f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s"

@@ -64,7 +64,7 @@ _WARM_PUSH = 1e-6
 
 
 _BARRIER_TOLERANCE = 50.0
-"""How loosely each barrier problem but the last is solved, in multiples of the barrier's parameter; IPOPT's own is 10."""
+"""How loosely a barrier problem is solved before the next: in multiples of its parameter; IPOPT's own is 10."""
 
 
 class Phase(Enum):
