@@ -1,6 +1,7 @@
 """Time bundled scenarios, each run in a process of its own: a Markdown table of medians.
 
-    python benchmarks/solve.py [SCENARIO ...] [--runs 3] [--tight] [--reference short|full] [--growth] [--into PAGE]
+    python benchmarks/solve.py [SCENARIO ...] [--runs 3] [--tight] [--reference short|full [--reference-of NAME ...]]
+                               [--growth] [--into PAGE]
 
 A scenario is the name of a bundled one or a TOML file. A run solves it as the command line does without pictures, in a
 process of its own, and then from Python: built, solved from its plain start guess, and solved again from that answer
@@ -9,8 +10,9 @@ How an iteration's time is split is that of the last phase, the exact one. Where
 are compiled at the end, into a folder of this run, and the first solve is repeated with them.
 
 * `--tight` goes on from an answer with a hundredth of the tolerance: how far its objective is above the converged one.
-* `--reference` runs `paper_reference.py` too, for the scenarios that it has: `full` to its end, which takes half an
-  hour and compares whole times; `short` for some iterations, which compares building and the time of an iteration.
+* `--reference` runs `paper_reference.py` too, for the scenarios that it has or those of `--reference-of`: `full` to its
+  end, which takes up to half an hour each and compares whole times; `short` for some iterations, which compares
+  building and the time of an iteration.
 * `--growth` iterates the take-off a fixed number of times on several grids of the same duration.
 
 The table goes to standard output and to `--output`, and between the marks of a page with `--into docs/performance.md`.
@@ -235,7 +237,7 @@ def measure(name: str, chosen: argparse.Namespace) -> Figures:
     figures = medians(alone(command, name, chosen.runs)) | medians(alone(library, name, chosen.runs))
     if chosen.tight:
         figures |= medians(alone(tight, name, 1))
-    if chosen.reference and name in REFERENCES:
+    if chosen.reference and name in chosen.reference_of:
         figures |= ratios(figures, reference(name, chosen.reference), chosen.reference)
     return figures
 
@@ -295,6 +297,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=3, help="of which medians are taken")
     parser.add_argument("--tight", action="store_true", help="compare with the objective of a tighter solve")
     parser.add_argument("--reference", choices=("short", "full"), help="run the paper's transcription too")
+    parser.add_argument("--reference-of", nargs="+", choices=REFERENCES, default=REFERENCES, help="for these only")
     parser.add_argument("--growth", action="store_true", help="iterate the take-off on several grids")
     parser.add_argument("--output", type=Path, default=Path("results/solve.md"), help="file of the tables")
     parser.add_argument("--into", type=Path, metavar="PAGE", help="also set them between the marks of a page")
