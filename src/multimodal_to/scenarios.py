@@ -151,18 +151,21 @@ def jump() -> Scenario:
 def step_up() -> Scenario:
     """Return a flight up onto a step: from a hover in front of it to standing on it, 0.10 m up. It is not in the paper.
 
-    Weights are the landing's. It moves faster than the landing, and steps of 0.1 s leave more of the base's wrench
-    unexplained than the audit's hundredth of the weight, 3 to 8 N.
+    Weights are the landing's, but for the legs' speed, which has the walk's: legs that fold at 3 rad/s to clear the
+    edge have a momentum that steps of 0.1 s follow badly. With it they fold at 1 rad/s, and up to 5 N of the base's
+    wrench are left unexplained, which the audit's hundredth of the weight does not always allow.
     """
+    from_air = landing()
     return replace(
-        landing(),
+        from_air,
         name="step-up",
         title="Flying up onto a step",
         initial_com=(0.0, 0.0, 0.72),
         final_com=(-0.4, 0.0, 0.67),
         sliding_max=2e-3,
+        weights=replace(from_air.weights, joint_velocities={"upper_body": 5e5, "legs": 1e5}),
         surface=Stairs(edges=(0.2,), heights=(0.0, 0.1), direction=(-1.0, 0.0), width=0.06),
-        allowances={"unexplained base force": 15.0, "unexplained base moment": 5.0},
+        allowances={"unexplained base force": 10.0},
     )
 
 
