@@ -72,7 +72,7 @@ def test_a_solve_cut_short_ends_with_the_best_of_all_its_iterates(problem, shown
 
 
 def test_a_time_limit_ends_with_an_iterate_and_its_status(problem):
-    cut = mt.solve(problem, mt.Ipopt(time_limit=0.5))
+    cut = mt.solve(problem, mt.Ipopt(time_limit=0.1))
     assert cut.status is mt.Status.TIME_LIMIT
     assert cut.solve_time < 5.0
     assert cut.objective == pytest.approx(sum(problem.costs(problem.start_from(cut.trajectory)).values()), rel=1e-6)
