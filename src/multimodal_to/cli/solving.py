@@ -197,7 +197,7 @@ def solve(
     console.print(
         f"{scenario.title}: {the_robot.name}, {scenario.knots} knots, {problem.lower.size} variables, "
         f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s"
-        f"{' with compiled functions' if problem.nlp.compiled else ''}, "
+        f"{' with compiled derivatives' if problem.nlp.compiled else ''}, "
         f"linear solver {chosen_solver.name}",
         soft_wrap=True,
     )

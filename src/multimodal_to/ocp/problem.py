@@ -170,7 +170,7 @@ def precompile(robot: Robot, scenario: Scenario) -> tuple[Path, ...]:
     Raises:
         ScenarioError: the scenario contradicts itself or does not fit the robot.
         SolverError: there is no C compiler, or it refuses.
-        OutputError: the folder of compiled functions cannot be written to.
+        OutputError: the folder of compiled derivatives cannot be written to.
     """
     robot, standing = _prepared(robot, scenario)
     _, _, stages = formulate(robot, scenario, standing)
