@@ -91,9 +91,17 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3  # Linux counts in kB
 
 
+@contextmanager
+def empty_cache() -> Iterator[None]:
+    """Let this process and its children find no compiled functions but their own."""
+    with tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, {compiled.CACHE_VARIABLE: folder}):
+        yield
+
+
+@empty_cache()
 def command(name: str) -> Figures:
     """Run the whole command without pictures; it must end with an answer."""
-    with tempfile.TemporaryDirectory() as folder, empty_cache():
+    with tempfile.TemporaryDirectory() as folder:
         arguments = ["solve", name, "--quiet", "--no-pictures", "--output", folder]
         started = time.perf_counter()
         ended = subprocess.run([sys.executable, "-m", "multimodal_to", *arguments], check=False)
@@ -101,13 +109,6 @@ def command(name: str) -> Figures:
         peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e3  # of the only child
         solved = ended.returncode == 0
     return {"command, cold [s]": spent, "command, peak memory [MB]": peak, "command has an answer": solved}
-
-
-@contextmanager
-def empty_cache() -> Iterator[None]:
-    """Let this process and its children find no compiled functions but their own."""
-    with tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, {compiled.CACHE_VARIABLE: folder}):
-        yield
 
 
 @empty_cache()
@@ -158,6 +159,7 @@ def judged(problem: mt.Problem, solution: mt.Solution) -> Figures:
     }
 
 
+@empty_cache()
 def tight(name: str) -> Figures:
     """Solve, go on from the answer with a smaller tolerance, and compare the objectives."""
     problem = mt.build(mt.load_robot("ironcub"), scenario_of(name))
@@ -178,6 +180,7 @@ def on_grid(scenario: mt.Scenario, knots: int) -> mt.Scenario:
     )
 
 
+@empty_cache()
 def growth(knots: str) -> Figures:
     """Iterate the take-off on a grid of so many knots."""
     scenario = on_grid(mt.scenarios.take_off(), int(knots))
