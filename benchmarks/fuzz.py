@@ -39,13 +39,13 @@ import multimodal_to as mt
 from multimodal_to import errors, scenario_files, scenarios
 from multimodal_to.adam.inspection import describe
 from multimodal_to.errors import LONGEST, MultimodalError
-from multimodal_to.importing import import_arrays
 from multimodal_to.models.robot import bundled_robots
 from multimodal_to.models.terrain import HeightField, Plane, Stairs
-from multimodal_to.ocp.scenario_data import stored, to_json
 from multimodal_to.replay.dress import read_dress
 from multimodal_to.replay.visuals import appearance
+from multimodal_to.scenarios.data import stored, to_json
 from multimodal_to.trajectory import QUANTITIES, Trajectory
+from multimodal_to.trajectory.importing import import_arrays
 
 PATIENCE = 10.0  # [s] for one input, of which none needs one
 MEMORY = 8 << 30  # address space of the process [byte], so that what is allotted without measure fails
@@ -107,11 +107,50 @@ thrust_max = 100.0
 throttle = [0.0, 100.0]
 """
 NASTY = (
-    "", " ", "nan", "inf", "-inf", "1e400", "1e308", "-1e-320", "0", "-1", "true", "9" * 5000, "0x" + "f" * 9000,
-    "../../../etc/passwd", "/dev/zero", "file:///etc/passwd", "package://x/../../y", "a" * 5000, "\ud800", "\0",
-    "&x;", "&#0;", "%00", "é", "1 2", "1,2,3", "[" * 3000, "{" * 3000, "a." * 3000 + "a", "'" * 3, '"', "=",
-    "\x1b[2J", "\r\n", "[/b]", "1979-05-27T07:32:00Z", "[[a]]", "<", "]]>", "<!DOCTYPE a>", "joint", "link", "robot",
-)  # fmt: skip
+    "",
+    " ",
+    "nan",
+    "inf",
+    "-inf",
+    "1e400",
+    "1e308",
+    "-1e-320",
+    "0",
+    "-1",
+    "true",
+    "9" * 5000,
+    "0x" + "f" * 9000,
+    "../../../etc/passwd",
+    "/dev/zero",
+    "file:///etc/passwd",
+    "package://x/../../y",
+    "a" * 5000,
+    "\ud800",
+    "\0",
+    "&x;",
+    "&#0;",
+    "%00",
+    "é",
+    "1 2",
+    "1,2,3",
+    "[" * 3000,
+    "{" * 3000,
+    "a." * 3000 + "a",
+    "'" * 3,
+    '"',
+    "=",
+    "\x1b[2J",
+    "\r\n",
+    "[/b]",
+    "1979-05-27T07:32:00Z",
+    "[[a]]",
+    "<",
+    "]]>",
+    "<!DOCTYPE a>",
+    "joint",
+    "link",
+    "robot",
+)
 
 
 class Hang(BaseException):
@@ -226,10 +265,31 @@ def mutated_toml(data: bytes, rng: random.Random) -> bytes:
         elif action == 2 and isinstance(owner, dict):
             owner[rng.choice((f"{key}x", "kind", "", rng.choice(NASTY[:20])[:40]))] = owner.pop(key)
         else:
-            owner[key] = rng.choice((
-                float("nan"), float("inf"), -1.0, 0, 1e308, 5e-324, 10**400, 1 << 40000, True, "", "x", [], {}, [[]],
-                [0.0] * 3, {"kind": "stairs"}, "plane", "height-field", ["a", "a"], rng.choice(NASTY), [{"a": [{}]}],
-            ))  # fmt: skip
+            owner[key] = rng.choice(
+                (
+                    float("nan"),
+                    float("inf"),
+                    -1.0,
+                    0,
+                    1e308,
+                    5e-324,
+                    10**400,
+                    1 << 40000,
+                    True,
+                    "",
+                    "x",
+                    [],
+                    {},
+                    [[]],
+                    [0.0] * 3,
+                    {"kind": "stairs"},
+                    "plane",
+                    "height-field",
+                    ["a", "a"],
+                    rng.choice(NASTY),
+                    [{"a": [{}]}],
+                )
+            )
     try:
         return tomli_w.dumps(root).encode("utf-8", errors="surrogatepass")
     except ValueError:  # more digits than Python writes
@@ -258,8 +318,11 @@ def mutated_arrays(data: bytes, rng: random.Random) -> bytes:
         elif action == 2:
             arrays[name] = rng.choice((array.T, array.ravel(), array[None], np.atleast_1d(array)[..., :-1]))
         elif action == 3:
-            arrays[name] = array.astype(rng.choice(("U3", "S3", "V8", "c16", "f2", "?", "M8[s]", "i1", "g"))) \
-                if array.dtype.kind == "f" else np.zeros(3)  # fmt: skip
+            arrays[name] = (
+                array.astype(rng.choice(("U3", "S3", "V8", "c16", "f2", "?", "M8[s]", "i1", "g")))
+                if array.dtype.kind == "f"
+                else np.zeros(3)
+            )
         elif action == 4 and array.dtype.kind == "f" and array.size:
             array = array.copy()
             array.flat[rng.randrange(array.size)] = rng.choice((np.nan, np.inf, 1e308, -1e308, 5e-324, 1e20))
@@ -347,10 +410,15 @@ def trajectory_file(robot: mt.Robot, folder: Path) -> bytes:
     bodies = {"robot": 1, "joint": len(robot.joint_names), "contact": len(robot.contacts), "jet": len(robot.jets)}
     arrays = {name: np.ones((quantity.rows * bodies[quantity.of], 4)) for name, quantity in QUANTITIES.items()}
     trajectory = Trajectory(
-        robot=robot.name, scenario="take-off", time=np.arange(4.0), joint_names=robot.joint_names,
-        contact_names=robot.contact_names, jet_names=robot.jet_names,
-        scenario_json=to_json(scenarios.take_off()), **arrays,
-    )  # fmt: skip
+        robot=robot.name,
+        scenario="take-off",
+        time=np.arange(4.0),
+        joint_names=robot.joint_names,
+        contact_names=robot.contact_names,
+        jet_names=robot.jet_names,
+        scenario_json=to_json(scenarios.take_off()),
+        **arrays,
+    )
     return trajectory.save(folder / "valid.npz").read_bytes()
 
 
@@ -464,8 +532,14 @@ def main() -> None:
             console.print(f"{kind} {index}: {fault.strip().splitlines()[-1][:200]}")
         failed += len(result.failures)
         by = ", ".join(f"{name} {count}" for name, count in sorted(refusals.items()))
-        table.add_row(kind, str(options.count), str(result.endings["read"]), str(sum(refusals.values())), by,
-                      str(len(result.failures)))  # fmt: skip
+        table.add_row(
+            kind,
+            str(options.count),
+            str(result.endings["read"]),
+            str(sum(refusals.values())),
+            by,
+            str(len(result.failures)),
+        )
     console.print(table)
     sys.exit(1 if failed else 0)
 

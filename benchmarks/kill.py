@@ -50,8 +50,11 @@ class Terminal:
         self._terminal, self._before = terminal, termios.tcgetattr(terminal)
         self.process = subprocess.Popen(
             [sys.executable, "-m", "multimodal_to", "solve", *(task or TASK), "--output", folder],
-            stdin=terminal, stdout=terminal, stderr=terminal, preexec_fn=_own_terminal,
-        )  # fmt: skip
+            stdin=terminal,
+            stdout=terminal,
+            stderr=terminal,
+            preexec_fn=_own_terminal,
+        )
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
         self._signalled = time.perf_counter()
@@ -176,9 +179,11 @@ def main() -> int:
             end = interrupted(folder, delay, twice=twice)
             record = kept(folder)
             sane = end.sane and end.cursor_shown
-            print(f"Ctrl-C {'twice' if twice else 'once '} after {delay:4.1f} s: status {end.status}, ended "
-                  f"{end.waited:.1f} s later, terminal {'sane' if sane else 'NOT SANE'}, "
-                  f"left: {'nothing' if record is None else record['kind'] + ', ' + record['status']}")  # fmt: skip
+            print(
+                f"Ctrl-C {'twice' if twice else 'once '} after {delay:4.1f} s: status {end.status}, ended "
+                f"{end.waited:.1f} s later, terminal {'sane' if sane else 'NOT SANE'}, "
+                f"left: {'nothing' if record is None else record['kind'] + ', ' + record['status']}"
+            )
             good &= sane and (end.waited < AT_ONCE if twice else record is not None)
     print("nothing was lost" if good else "something was lost")
     return 0 if good else 1

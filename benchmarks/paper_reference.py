@@ -120,23 +120,42 @@ FLYING = {"com_acceleration": 1e5, "com_velocity": 1e7, "angular_momentum_rate":
 FINAL_WEIGHTS = dict.fromkeys(FLYING, 1e6)
 CASES = {
     "take-off": Case(
-        knots=70, final_com=(0.0, 0.0, 0.70),
+        knots=70,
+        final_com=(0.0, 0.0, 0.70),
         weights=FLYING | {"contact_force_rates": 1.0, "contact_forces": 5e1, "throttle": 1e-1},
-        upper_body_weight=5e5, legs_weight=1e4, posture_weight=1e6, initial_posture_weight=1e6, slack_weight=1e5,
+        upper_body_weight=5e5,
+        legs_weight=1e4,
+        posture_weight=1e6,
+        initial_posture_weight=1e6,
+        slack_weight=1e5,
     ),
     "walk-to-fly": Case(
-        knots=100, final_com=(-0.9, 0.0, 0.70),
+        knots=100,
+        final_com=(-0.9, 0.0, 0.70),
         weights=FLYING | {"contact_forces": 1.0, "thrust": 2e3},
-        upper_body_weight=5e5, legs_weight=1e5, posture_weight=1e7, initial_posture_weight=1e6,
-        base_orientation_weight=1e7, slack_weight=1e7,
+        upper_body_weight=5e5,
+        legs_weight=1e5,
+        posture_weight=1e7,
+        initial_posture_weight=1e6,
+        base_orientation_weight=1e7,
+        slack_weight=1e7,
     ),
     "jump": Case(
-        knots=60, final_com=(0.0, 0.0, 0.57), mid_height=0.75, jets=False,
+        knots=60,
+        final_com=(0.0, 0.0, 0.57),
+        mid_height=0.75,
+        jets=False,
         weights=dict.fromkeys(FLYING, 1.0) | {"contact_force_rates": 1e-1, "contact_forces": 1.0},
-        upper_body_weight=1e4, legs_weight=1e4, posture_weight=2e1, initial_posture_weight=1e5,
-        final_posture_weight=1e5, axes_of_speed=2, slack_weight=5e4, slack_max=1e-3,
+        upper_body_weight=1e4,
+        legs_weight=1e4,
+        posture_weight=2e1,
+        initial_posture_weight=1e5,
+        final_posture_weight=1e5,
+        axes_of_speed=2,
+        slack_weight=5e4,
+        slack_max=1e-3,
     ),
-}  # fmt: skip
+}
 
 
 class Transcription:
@@ -337,10 +356,14 @@ class Transcription:
         values = {key: np.reshape(self.opti.debug.value(value), value.shape) for key, value in known.items()}
         robot: Robot = self.robot
         return Trajectory(
-            robot=robot.name, scenario=name, joint_names=robot.joint_names, contact_names=robot.contact_names,
+            robot=robot.name,
+            scenario=name,
+            joint_names=robot.joint_names,
+            contact_names=robot.contact_names,
             jet_names=robot.jet_names,
-            time=np.linspace(0.0, float(self.opti.debug.value(self.duration)), self.case.knots + 1), **values,
-        )  # fmt: skip
+            time=np.linspace(0.0, float(self.opti.debug.value(self.duration)), self.case.knots + 1),
+            **values,
+        )
 
 
 def transform(rotation: cs.MX, position: cs.MX) -> cs.MX:

@@ -31,9 +31,16 @@ from multimodal_to.adam import KinDynComputations
 ROBOT = Path(__file__).parents[1] / "robots" / "ironcub"
 FRAME = "l_sole"
 BUDGET = {
-    "mass matrix": 7000, "CMM": 6000, "CoM": 1100, "bias": 5500, "RNEA": 6500, "FK of l_sole": 220,
-    "Jacobian of l_sole": 500, "angular momentum": 3800, "Hessian of λᵀhω": 75000,
-}  # fmt: skip
+    "mass matrix": 7000,
+    "CMM": 6000,
+    "CoM": 1100,
+    "bias": 5500,
+    "RNEA": 6500,
+    "FK of l_sole": 220,
+    "Jacobian of l_sole": 500,
+    "angular momentum": 3800,
+    "Hessian of λᵀhω": 75000,
+}
 
 
 def angular_momentum(kindyn: Any, direct: bool) -> tuple[cs.Function, cs.Function]:
@@ -177,9 +184,16 @@ def main() -> None:
         ratio = f"{peer / count:.1f}" if peer else ""
         print(f"{name:32}{count:10}{peer or '':>10}{ratio:>8}{BUDGET.get(name, ''):>10}")
     print("\nwhat they are: ", end="")
-    print(*(f"{name} {arithmetic(function)}" for name, function in (
-        ("mass matrix", kindyn.mass_matrix_fun()), ("RNEA", kindyn.rnea_fun()),
-    )), sep="; ")  # fmt: skip
+    print(
+        *(
+            f"{name} {arithmetic(function)}"
+            for name, function in (
+                ("mass matrix", kindyn.mass_matrix_fun()),
+                ("RNEA", kindyn.rnea_fun()),
+            )
+        ),
+        sep="; ",
+    )
 
     rng = np.random.default_rng(0)
     state = [np.eye(4), rng.normal(size=kindyn.NDoF), rng.normal(size=6), rng.normal(size=kindyn.NDoF)]

@@ -26,7 +26,7 @@ import multimodal_to as mt
 from multimodal_to import scenarios
 from multimodal_to.models.robot import Robot, bundled_robots
 from multimodal_to.models.terrain import Stairs
-from multimodal_to.ocp.scenario import Scenario
+from multimodal_to.scenarios.scenario import Scenario
 
 TIME_LIMIT = 600.0  # of a solve [s]; generous, so that a loaded machine does not decide
 
@@ -98,15 +98,26 @@ def run(task: tuple[str, int, int]) -> Outcome:
         solution = mt.solve(mt.build(robot, scenario), mt.Ipopt(time_limit=TIME_LIMIT))
     except mt.MultimodalError as error:
         return Outcome(
-            scenario=name, index=index, drawn=drawn, status=type(error).__name__, advice=str(error), iterations=0,
-            seconds=0.0, failed=(),
-        )  # fmt: skip
+            scenario=name,
+            index=index,
+            drawn=drawn,
+            status=type(error).__name__,
+            advice=str(error),
+            iterations=0,
+            seconds=0.0,
+            failed=(),
+        )
     report = mt.audit(robot if scenario.jets else robot.with_jets(()), solution.trajectory)
     return Outcome(
-        scenario=name, index=index, drawn=drawn, status=solution.status.value, advice=solution.status.advice,
-        iterations=solution.iterations, seconds=solution.solve_time,
+        scenario=name,
+        index=index,
+        drawn=drawn,
+        status=solution.status.value,
+        advice=solution.status.advice,
+        iterations=solution.iterations,
+        seconds=solution.solve_time,
         failed=tuple(finding.name for finding in report.findings if not finding.holds),
-    )  # fmt: skip
+    )
 
 
 def main() -> None:
@@ -125,8 +136,9 @@ def main() -> None:
             verdict = "passes" if outcome.passed else f"fails: {', '.join(outcome.failed) or outcome.advice}"
             console.print(
                 f"{outcome.scenario} {outcome.index}: {outcome.drawn}: {outcome.status}, {outcome.iterations} "
-                f"iterations, {outcome.seconds:.0f} s, {verdict}", soft_wrap=True,
-            )  # fmt: skip
+                f"iterations, {outcome.seconds:.0f} s, {verdict}",
+                soft_wrap=True,
+            )
     table = Table("scenario", "solved and true", "iterations, median", "greatest")
     for name in options.scenarios:
         own = [outcome for outcome in outcomes if outcome.scenario == name]

@@ -23,8 +23,16 @@ from multimodal_to import scenarios
 from multimodal_to.simulation import Tracking, play, stabiliser, tracking
 from multimodal_to.trajectory import Trajectory
 
-GAINS = ("COM_STIFFNESS", "COM_DAMPING", "ATTITUDE_STIFFNESS", "ATTITUDE_DAMPING", "THRUST_SPREAD", "LOAD_SPREAD",
-         "JOINT_SPREAD", "RADIUS")  # fmt: skip
+GAINS = (
+    "COM_STIFFNESS",
+    "COM_DAMPING",
+    "ATTITUDE_STIFFNESS",
+    "ATTITUDE_DAMPING",
+    "THRUST_SPREAD",
+    "LOAD_SPREAD",
+    "JOINT_SPREAD",
+    "RADIUS",
+)
 SPREAD = 0.2
 SURVIVES = ("stands", "hovers")
 
@@ -62,9 +70,12 @@ def errors(outcome: Tracking) -> tuple[str, ...]:
     if outcome.end not in SURVIVES:
         return "–", "–", "–", "–", ended(outcome)
     return (
-        f"{100 * outcome.com:.1f} cm", f"{outcome.attitude:.1f}°", f"{outcome.joint:.0f}°",
-        f"{max(late, default=0.0):.2f} s", ended(outcome),
-    )  # fmt: skip
+        f"{100 * outcome.com:.1f} cm",
+        f"{outcome.attitude:.1f}°",
+        f"{outcome.joint:.0f}°",
+        f"{max(late, default=0.0):.2f} s",
+        ended(outcome),
+    )
 
 
 def ended(outcome: Tracking) -> str:
@@ -91,9 +102,13 @@ def main() -> None:
     console.print(f"| {' | '.join(titles)} |\n|{' -- |' * len(titles)}")
     for name in options.plans:
         plan = plan_of(name)
-        row = [plan.scenario if name.endswith(".npz") else Path(name).stem,
-               f"{plan.knots} of {plan.duration / plan.knots:.2f} s", *errors(playback(plan)),
-               in_short(playback(plan, delay=1.0)), in_short(playback(plan, stabilise=False))]  # fmt: skip
+        row = [
+            plan.scenario if name.endswith(".npz") else Path(name).stem,
+            f"{plan.knots} of {plan.duration / plan.knots:.2f} s",
+            *errors(playback(plan)),
+            in_short(playback(plan, delay=1.0)),
+            in_short(playback(plan, stabilise=False)),
+        ]
         if options.trials:
             rng, outcomes = np.random.default_rng(options.seed), []
             for _ in range(options.trials):

@@ -41,9 +41,9 @@ from typing import Any
 from unittest.mock import patch
 
 import multimodal_to as mt
-from multimodal_to.machine import versions
 from multimodal_to.ocp import compiled
-from multimodal_to.scenario_files import load
+from multimodal_to.scenarios.files import load
+from multimodal_to.solving.machine import versions
 
 HIGHER = 0.02  # by so much the target of the warm solve [m]
 TIGHTER = 1e-2  # what --tight multiplies the tolerance with
@@ -123,13 +123,21 @@ def library(name: str) -> Figures:
     warm_problem = mt.build(robot, higher(scenario))
     warm = mt.solve(warm_problem, start=cold.trajectory)
     return {
-        "variables": problem.lower.size, "rows": problem.row_lower.size, "build [s]": built,
-        "first solve [s]": cold.solve_time, "iterations": cold.iterations, **per_iteration(cold.statistics),
-        "peak memory [MB]": peak, "status": cold.status.value, **judged(problem, cold),
-        "warm solve [s]": warm.solve_time, "warm iterations": warm.iterations, "warm status": warm.status.value,
+        "variables": problem.lower.size,
+        "rows": problem.row_lower.size,
+        "build [s]": built,
+        "first solve [s]": cold.solve_time,
+        "iterations": cold.iterations,
+        **per_iteration(cold.statistics),
+        "peak memory [MB]": peak,
+        "status": cold.status.value,
+        **judged(problem, cold),
+        "warm solve [s]": warm.solve_time,
+        "warm iterations": warm.iterations,
+        "warm status": warm.status.value,
         **{f"warm {key}": value for key, value in judged(warm_problem, warm).items()},
         **with_compiled(robot, scenario),
-    }  # fmt: skip
+    }
 
 
 def with_compiled(robot: mt.Robot, scenario: mt.Scenario) -> Figures:
@@ -144,8 +152,13 @@ def with_compiled(robot: mt.Robot, scenario: mt.Scenario) -> Figures:
     problem = mt.build(robot, scenario)
     built = time.perf_counter() - started
     solution = mt.solve(problem)
-    return {"compiling [s]": spent, "compiled build [s]": built, "compiled solve [s]": solution.solve_time,
-            "compiled iterations": solution.iterations, "compiled objective": solution.objective}  # fmt: skip
+    return {
+        "compiling [s]": spent,
+        "compiled build [s]": built,
+        "compiled solve [s]": solution.solve_time,
+        "compiled iterations": solution.iterations,
+        "compiled objective": solution.objective,
+    }
 
 
 def judged(problem: mt.Problem, solution: mt.Solution) -> Figures:
@@ -189,9 +202,11 @@ def growth(knots: str) -> Figures:
     built = time.perf_counter() - started
     solution = mt.solve(problem, mt.Ipopt(max_iterations=GROWTH_ITERATIONS))
     return {
-        "variables": problem.lower.size, "build [s]": built,
-        **per_iteration(solution.statistics), "peak memory [MB]": peak_memory(),
-    }  # fmt: skip
+        "variables": problem.lower.size,
+        "build [s]": built,
+        **per_iteration(solution.statistics),
+        "peak memory [MB]": peak_memory(),
+    }
 
 
 def reference(name: str, length: str) -> Figures:
@@ -211,8 +226,10 @@ def ratios(here: Figures, paper: Figures, length: str) -> Figures:
         "iteration": 1e3 * paper["solver per iteration [s]"] / here["iteration, whole [ms]"],
     }
     if length == "full":
-        compared |= {"solver": paper["solver [s]"] / here["first solve [s]"],
-                     "whole": paper["whole [s]"] / here["command, cold [s]"]}  # fmt: skip
+        compared |= {
+            "solver": paper["solver [s]"] / here["first solve [s]"],
+            "whole": paper["whole [s]"] / here["command, cold [s]"],
+        }
     return {f"reference / here, {what}": f"{value:.3g}" for what, value in compared.items()}
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 import multimodal_to as mt
-from multimodal_to.derived import contact_points, vertical_thrust
 from multimodal_to.replay import write_html
+from multimodal_to.trajectory.derived import contact_points, vertical_thrust
 
 robot = mt.load_robot("ironcub")
 solution = mt.solve(mt.build(robot, mt.scenarios.landing()))

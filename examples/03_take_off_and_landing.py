@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import multimodal_to as mt
-from multimodal_to.derived import flight_phases
 from multimodal_to.plotting import plot_com, plot_forces, save
+from multimodal_to.trajectory.derived import flight_phases
 
 robot = mt.load_robot("ironcub")
 problem = mt.build(robot, mt.scenarios.take_off_and_landing())

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 import multimodal_to as mt
-from multimodal_to.derived import flight_phases, footsteps, vertical_thrust
 from multimodal_to.plotting import plot_contacts, save
+from multimodal_to.trajectory.derived import flight_phases, footsteps, vertical_thrust
 
 robot = mt.load_robot("ironcub")
 scenario = mt.scenarios.walk_to_fly()

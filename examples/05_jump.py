@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 import multimodal_to as mt
-from multimodal_to.derived import generalised_forces
 from multimodal_to.plotting import plot_torques, save
+from multimodal_to.trajectory.derived import generalised_forces
 
 scenario = mt.scenarios.jump()
 problem = mt.build(mt.load_robot("ironcub"), scenario)

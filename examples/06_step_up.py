@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import multimodal_to as mt
-from multimodal_to.derived import contact_points
-from multimodal_to.export import EXPORTS
-from multimodal_to.report import write_report
+from multimodal_to.exporting.export import EXPORTS
+from multimodal_to.reporting.report import write_report
+from multimodal_to.trajectory.derived import contact_points
 
 robot = mt.load_robot("ironcub")
 scenario = mt.scenarios.step_up()

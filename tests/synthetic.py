@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from multimodal_to.derived import frame_poses
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import QUANTITIES, Trajectory
+from multimodal_to.trajectory.derived import frame_poses
 
 DURATION = 2.0  # [s]
 KNOTS = 20
@@ -37,9 +37,14 @@ def take_off(robot: Robot) -> Trajectory:
 
     def trajectory() -> Trajectory:
         return Trajectory(
-            robot=robot.name, scenario="take-off & hover", time=time, joint_names=robot.joint_names,
-            contact_names=robot.contact_names, jet_names=robot.jet_names, **arrays,
-        )  # fmt: skip
+            robot=robot.name,
+            scenario="take-off & hover",
+            time=time,
+            joint_names=robot.joint_names,
+            contact_names=robot.contact_names,
+            jet_names=robot.jet_names,
+            **arrays,
+        )
 
     feet = [frame_poses(robot, trajectory(), name)[:, :3, 3].T for name in robot.contact_names]
     arrays["contact_positions"] = np.concatenate(feet)

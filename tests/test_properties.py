@@ -13,15 +13,15 @@ from hypothesis import strategies as st
 from lxml import etree
 from scipy.spatial.transform import Rotation
 
-from multimodal_to import scenario_files
 from multimodal_to.adam import KinDynComputations, quaternion
 from multimodal_to.adam.inspection import describe
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.terrain import FlatGround, HeightField, Plane, Stairs
-from multimodal_to.ocp.scenario import Scenario, Start, Terminal, Weights
-from multimodal_to.ocp.scenario_data import from_dict, to_dict
-from multimodal_to.resampling import resample
+from multimodal_to.scenarios import files as scenario_files
+from multimodal_to.scenarios.data import from_dict, to_dict
+from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Weights
 from multimodal_to.trajectory import QUANTITIES, Trajectory
+from multimodal_to.trajectory.resampling import resample
 from random_trees import random_urdf
 
 quick = settings(

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import multimodal_to as mt
-from multimodal_to.scenario_files import to_toml
+from multimodal_to.scenarios.files import to_toml
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import solve
@@ -21,9 +21,15 @@ PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
 def squat(tmp_path_factory) -> str:
     """A file with a scenario that is solved fast: the CoM goes down while the robot stands."""
     scenario = replace(
-        mt.scenarios.jump(), name="squat", knots=6, mid_height_min=None, final_com=(0.0, 0.0, 0.54), interval_min=0.1,
-        interval_max=0.2, allowances={},
-    )  # fmt: skip
+        mt.scenarios.jump(),
+        name="squat",
+        knots=6,
+        mid_height_min=None,
+        final_com=(0.0, 0.0, 0.54),
+        interval_min=0.1,
+        interval_max=0.2,
+        allowances={},
+    )
     file = tmp_path_factory.mktemp("benchmark") / "squat.toml"
     file.write_text(to_toml(scenario), encoding="utf-8")
     return str(file)

@@ -5,28 +5,18 @@ A `Robot` and a `Scenario` go into `build`; `solve` returns a `Solution` with a 
 trajectory and the robot.
 """
 
-from multimodal_to import scenario_files, scenarios
+from multimodal_to import scenarios
 from multimodal_to.adam import KinDynComputations
-from multimodal_to.audit import Audit, audit
+from multimodal_to.auditing import Audit, audit
 from multimodal_to.doctor import Diagnosis, doctor
 from multimodal_to.errors import MultimodalError
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.models.terrain import FlatGround, HeightField, Plane, Stairs
-from multimodal_to.ocp import (
-    Ipopt,
-    Problem,
-    Scenario,
-    Solution,
-    Start,
-    Status,
-    Terminal,
-    Weights,
-    build,
-    precompile,
-    relax,
-    solve,
-)
+from multimodal_to.ocp import Problem, build, precompile
+from multimodal_to.scenarios import Scenario, Start, Terminal, Weights
+from multimodal_to.scenarios import files as scenario_files
+from multimodal_to.solving import Ipopt, Solution, Status, relax, solve
 from multimodal_to.trajectory import Trajectory
 
 __all__ = [

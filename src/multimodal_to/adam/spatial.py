@@ -10,9 +10,12 @@ from typing import Any
 
 import casadi as cs
 import numpy as np
+from numpy.typing import NDArray
 
 SX = Any
 """A CasADi matrix: SX, MX or DM (CasADi carries no types)."""
+Array = NDArray[np.float64]
+"""An array of numbers."""
 
 
 def rotation_about_z(cosine: SX, sine: SX) -> SX:

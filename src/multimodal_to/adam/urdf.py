@@ -17,7 +17,7 @@ from lxml import etree
 from multimodal_to.adam.lean_tree import build_tree
 from multimodal_to.adam.tree import Joint, Link, Mimic, Tree
 from multimodal_to.errors import ModelError, listed, shortened
-from multimodal_to.reading import read_bytes
+from multimodal_to.files.reading import read_bytes
 
 LARGEST_URDF = 10_000_000
 """The largest URDF that is read [byte]."""

@@ -11,15 +11,16 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
-from multimodal_to.audit import Audit
+from multimodal_to.auditing.audit import Audit
 from multimodal_to.cli.completion import robots_or_folders, scenarios_or_files
 from multimodal_to.errors import InputError, OutputError, TrajectoryError, listed
-from multimodal_to.importing import import_arrays
 from multimodal_to.models.robot import Robot, load_robot
-from multimodal_to.ocp.scenario import Scenario
-from multimodal_to.scenario_files import change, load
 from multimodal_to.scenarios import find
-from multimodal_to.trajectory import Trajectory, read_archive
+from multimodal_to.scenarios.files import change, load
+from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.archive import read_archive
+from multimodal_to.trajectory.importing import import_arrays
 
 app = typer.Typer(
     name="multimodal-to",
@@ -37,10 +38,12 @@ ScenarioName = Annotated[
 OptionalName = Annotated[
     str | None,
     typer.Argument(
-        metavar="NAME", help="Scenario, as `list` shows it, or a TOML file of one; needless with --resume.",
-        show_default=False, autocompletion=scenarios_or_files,
+        metavar="NAME",
+        help="Scenario, as `list` shows it, or a TOML file of one; needless with --resume.",
+        show_default=False,
+        autocompletion=scenarios_or_files,
     ),
-]  # fmt: skip
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in --set final_com_height=0.8; repeatable."),

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from glob import escape, glob
 from pathlib import Path
 
-from multimodal_to.export import EXPORTS
+from multimodal_to.exporting.export import EXPORTS
 from multimodal_to.models.robot import bundled_robots
-from multimodal_to.ocp.linear_solvers import AUTO, LINEAR_SOLVERS
 from multimodal_to.scenarios import SCENARIOS
+from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS
 
 
 def scenarios(incomplete: str) -> list[str]:
@@ -60,5 +60,6 @@ def _starting(names: Iterable[str], incomplete: str) -> list[str]:
 
 def _paths(incomplete: str, suffixes: tuple[str, ...]) -> list[str]:
     found = sorted(glob(f"{escape(incomplete)}*"))
-    return [f"{path}/" if Path(path).is_dir() else path for path in found
-            if Path(path).is_dir() or path.endswith(suffixes)]  # fmt: skip
+    return [
+        f"{path}/" if Path(path).is_dir() else path for path in found if Path(path).is_dir() or path.endswith(suffixes)
+    ]

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.scenarios import SCENARIOS
+from multimodal_to.scenarios.scenario import Scenario
 
 TYPICAL_ITERATIONS: Mapping[str, int] = MappingProxyType(
     {"take-off": 95, "take-off-and-landing": 147, "landing": 97, "walk-to-fly": 156, "jump": 88, "step-up": 174}

@@ -14,7 +14,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from multimodal_to.adam.inspection import describe
-from multimodal_to.audit import Audit, audit
+from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.cli.common import File, RobotOption, app, described, loaded, out, writable
 from multimodal_to.cli.completion import robots_or_urdfs
 from multimodal_to.errors import OutputError
@@ -46,8 +46,15 @@ def audit_file(
     table = Table(*narrow, "where", Column(no_wrap=True), box=None, pad_edge=False)
     for finding in report.findings:
         verdict = Text("ok", style="green") if finding.holds else Text("FAILS", style="bold red")
-        table.add_row(finding.name, f"{finding.worst:.1e}", f"{finding.limit:.2g}", finding.unit, str(finding.knot),
-                      finding.body, verdict)  # fmt: skip
+        table.add_row(
+            finding.name,
+            f"{finding.worst:.1e}",
+            f"{finding.limit:.2g}",
+            finding.unit,
+            str(finding.knot),
+            finding.body,
+            verdict,
+        )
     out.print(table)
     out.print(described(report))
     if report.scenario is None:
@@ -108,8 +115,9 @@ def simulate(
     playback = simulation.play(the_robot, plan, stabilise=stabilise, delay=delay)
     outcome = simulation.tracking(playback)
     for where, difference in agreement.items():
-        out.print(f"inverse dynamics {where}: MuJoCo and RNEA differ by {difference:.1e} of the largest force",
-                   soft_wrap=True)  # fmt: skip
+        out.print(
+            f"inverse dynamics {where}: MuJoCo and RNEA differ by {difference:.1e} of the largest force", soft_wrap=True
+        )
     out.print(
         f"largest errors over {plan.duration:.2f} s: CoM {100 * outcome.com:.1f} cm, base {outcome.attitude:.1f}°, "
         f"joints {outcome.joint:.1f}° ({outcome.joint_name}), thrust {outcome.thrust:.1f} N; largest torque "
@@ -121,8 +129,11 @@ def simulate(
         happened = "never" if switch.simulated is None else f"{switch.simulated - switch.planned:+.2f} s"
         out.print(f"{kind} of the {switch.foot} foot: planned at {switch.planned:.2f} s, simulated {happened}")
     when = "" if outcome.fell is None else f" at {outcome.fell:.2f} s"
-    out.print(f"the robot {outcome.end}{when}; CoM error after the end "
-               f"{100 * outcome.com_at_end:.1f} cm, base {outcome.attitude_at_end:.1f}°", soft_wrap=True)  # fmt: skip
+    out.print(
+        f"the robot {outcome.end}{when}; CoM error after the end "
+        f"{100 * outcome.com_at_end:.1f} cm, base {outcome.attitude_at_end:.1f}°",
+        soft_wrap=True,
+    )
     out.print(f"wrote {simulation.simulated_trajectory(playback).save(target)}", soft_wrap=True)
     raise typer.Exit(0 if outcome.end in ("stands", "hovers") else 1)
 

@@ -10,7 +10,7 @@ from rich.live import Live
 from rich.text import Text
 
 from multimodal_to.cli.expectation import Expectation, Rest
-from multimodal_to.ocp import Iterate
+from multimodal_to.solving import Iterate
 
 _LINE_EVERY = 5.0  # [s] between progress lines where the output is no terminal
 

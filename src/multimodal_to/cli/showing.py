@@ -12,7 +12,7 @@ import typer
 from multimodal_to.cli.common import File, RobotOption, app, loaded, option_numbers, out, writable, writable_file
 from multimodal_to.cli.completion import exports, figures
 from multimodal_to.errors import InputError, OutputError, unknown
-from multimodal_to.export import EXPORTS
+from multimodal_to.exporting.export import EXPORTS
 from multimodal_to.models.robot import load_robot
 from multimodal_to.trajectory import Trajectory
 
@@ -134,7 +134,7 @@ def report_file(
     the_robot, trajectory = loaded(file, robot)
     target = output or file.with_suffix(".html")
     writable_file(target, ".html")
-    from multimodal_to.report import write_report
+    from multimodal_to.reporting.report import write_report
 
     out.print(f"wrote {write_report(the_robot, trajectory, target, meshes=meshes)}", soft_wrap=True)
 

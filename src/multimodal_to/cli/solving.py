@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Column, Table
 
-from multimodal_to.audit import Audit, audit
+from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.cli import completion
 from multimodal_to.cli.common import (
     OptionalName,
@@ -33,15 +33,16 @@ from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Robot, load_robot
-from multimodal_to.ocp import Ipopt, Relaxation, Solution, build, relax
+from multimodal_to.ocp import build
 from multimodal_to.ocp import precompile as compile_problem
-from multimodal_to.ocp import solve as run_solver
-from multimodal_to.ocp.linear_solvers import AUTO, LINEAR_SOLVERS, choose
-from multimodal_to.ocp.motion import motion
-from multimodal_to.ocp.scenario import Scenario
-from multimodal_to.ocp.scenario_data import stored, to_dict
-from multimodal_to.scenario_files import change, to_toml
 from multimodal_to.scenarios import SCENARIOS, find
+from multimodal_to.scenarios.data import stored, to_dict
+from multimodal_to.scenarios.files import change, to_toml
+from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.solving import Ipopt, Relaxation, Solution, relax
+from multimodal_to.solving import solve as run_solver
+from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
+from multimodal_to.solving.motion import motion
 from multimodal_to.trajectory import Trajectory
 
 _MISSES_SHOWN = 5
@@ -234,8 +235,10 @@ def precompile(name: ScenarioName, settings: Settings = None, robot: RobotOption
     started = time.perf_counter()
     files = compile_problem(load_robot(robot), chosen(name, settings))
     spent = f"{len(files)} functions compiled in {time.perf_counter() - started:.1f} s"
-    out.print(f"{name}: {spent}, kept in {files[0].parent}" if files else f"{name}: nothing is worth compiling",
-              soft_wrap=True)  # fmt: skip
+    out.print(
+        f"{name}: {spent}, kept in {files[0].parent}" if files else f"{name}: nothing is worth compiling",
+        soft_wrap=True,
+    )
 
 
 def _explain(console: Console, relaxation: Relaxation) -> None:
@@ -305,9 +308,9 @@ def reproduce_scenarios(
     folders = [writable(output / scenario.name) for scenario in scenarios]
     robot = load_robot("ironcub")
 
-    from multimodal_to.comparison import AUDITS, SOLVES, markdown, table
-    from multimodal_to.reproduce import read_published, reproduce, write_run
-    from multimodal_to.writing import write_text
+    from multimodal_to.files.writing import write_text
+    from multimodal_to.reporting.comparison import AUDITS, SOLVES, markdown, table
+    from multimodal_to.reporting.reproduce import read_published, reproduce, write_run
 
     files = [] if published is None else read_published(robot, published)
     runs = []

@@ -9,9 +9,9 @@ from rich.console import Console
 
 from multimodal_to.cli.common import chosen
 from multimodal_to.errors import InputError, ScenarioError
-from multimodal_to.ocp.scenario import Scenario
-from multimodal_to.ocp.scenario_data import stored
-from multimodal_to.scenario_files import change
+from multimodal_to.scenarios.data import stored
+from multimodal_to.scenarios.files import change
+from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory
 
 

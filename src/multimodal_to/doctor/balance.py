@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 
 import casadi as cs
 import numpy as np
-from numpy.typing import NDArray
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.doctor.task import Task
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Posture
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.guess import base_transform, contact_positions
 from multimodal_to.ocp.variables import Knot
-
-Array = NDArray[np.float64]
 
 LEVER = 0.3
 """What a residual moment is divided by to weigh it against a residual force [m]."""
@@ -71,8 +69,12 @@ def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, lever:
     matrix = np.hstack([matrix, missed, -missed])
     counts = np.array([1.0] * 3 + [1.0 / lever] * 3)
     reach = np.full(forces.shape[0], np.inf if feet else 0.0)
-    programme = cs.conic("balance", "highs", {"h": cs.Sparsity(matrix.shape[1], matrix.shape[1]),
-                         "a": cs.DM(matrix).sparsity()}, {"highs": {"output_flag": False}})  # fmt: skip
+    programme = cs.conic(
+        "balance",
+        "highs",
+        {"h": cs.Sparsity(matrix.shape[1], matrix.shape[1]), "a": cs.DM(matrix).sparsity()},
+        {"highs": {"output_flag": False}},
+    )
     answer = programme(
         g=np.concatenate([np.zeros(free.shape[0]), counts, counts]),
         a=matrix,

@@ -15,13 +15,24 @@ from multimodal_to.doctor.travel import leap, push, speed
 from multimodal_to.doctor.weighing import costs, groups, scales
 from multimodal_to.errors import MultimodalError
 from multimodal_to.models.robot import Robot
-from multimodal_to.ocp.scenario import Scenario
+from multimodal_to.scenarios.scenario import Scenario
 
 Check = Callable[[Task], Iterator[Symptom]]
 
 CHECKS: tuple[Check, ...] = (
-    groups, costs, scales, weight, spool_up_time, speed, push, leap, height, hold, reach, trim,
-)  # fmt: skip
+    groups,
+    costs,
+    scales,
+    weight,
+    spool_up_time,
+    speed,
+    push,
+    leap,
+    height,
+    hold,
+    reach,
+    trim,
+)
 """What is asked of every task."""
 ONCE_SOUND: tuple[Check, ...] = (formulation,)
 """What is asked of a task in which the others found no error: it needs a problem that can be made."""

@@ -17,8 +17,8 @@ from multimodal_to.models.terrain import FlatGround, frame_function
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.constraints import Rows, World
 from multimodal_to.ocp.guess import contact_positions
-from multimodal_to.ocp.scenario import Vector3
 from multimodal_to.ocp.variables import CONTACT_REACH, Knot
+from multimodal_to.scenarios.scenario import Vector3
 
 
 def height(task: Task) -> Iterator[Symptom]:
@@ -40,8 +40,12 @@ def height(task: Task) -> Iterator[Symptom]:
     elif isinstance(scenario.surface, FlatGround):
         above = scenario.final_com[2] - scenario.surface.height
         if above > CONTACT_REACH[2]:
-            yield error("standing end", f"the CoM has to end {above:.3g} m above the feet, beyond the reach of contact "
-                        f"points in the problem, {CONTACT_REACH[2]} m", _other_height(task, "final"))  # fmt: skip
+            yield error(
+                "standing end",
+                f"the CoM has to end {above:.3g} m above the feet, beyond the reach of contact "
+                f"points in the problem, {CONTACT_REACH[2]} m",
+                _other_height(task, "final"),
+            )
 
 
 def _no_posture(task: Task, com: Vector3) -> str:

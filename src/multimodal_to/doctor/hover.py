@@ -17,8 +17,8 @@ from multimodal_to.doctor.task import Task
 from multimodal_to.models.robot import Posture
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.constraints import Rows, World
-from multimodal_to.ocp.scenario import Vector3
 from multimodal_to.ocp.variables import Knot
+from multimodal_to.scenarios.scenario import Vector3
 
 _UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 _SLACK = 2e-2

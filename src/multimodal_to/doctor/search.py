@@ -7,24 +7,26 @@ from dataclasses import replace
 
 import casadi as cs
 import numpy as np
-from numpy.typing import NDArray
 
 from multimodal_to.adam import centroidal
-from multimodal_to.adam.spatial import SX
+from multimodal_to.adam.spatial import SX, Array
 from multimodal_to.doctor.balance import com_of, knot_of
 from multimodal_to.doctor.task import Task
 from multimodal_to.models.robot import Posture
 from multimodal_to.ocp.constraints import KnotRows
-from multimodal_to.ocp.scenario import Vector3
 from multimodal_to.ocp.variables import Knot
-
-Array = NDArray[np.float64]
+from multimodal_to.scenarios.scenario import Vector3
 
 
 def search(
-    task: Task, start: Posture, com: Vector3, *, rows: Sequence[KnotRows], objective: Callable[[Knot], SX],
+    task: Task,
+    start: Posture,
+    com: Vector3,
+    *,
+    rows: Sequence[KnotRows],
+    objective: Callable[[Knot], SX],
     thrusts: Array,
-) -> Posture | None:  # fmt: skip
+) -> Posture | None:
     """Return the posture with the least objective that fulfils rows at rest without contact forces, if one is found.
 
     The base keeps its orientation; its position, joints and thrusts are free. Solved by IPOPT, from one start: none

@@ -6,17 +6,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.doctor.turbines import greatest_held
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import FlatGround, Plane
 from multimodal_to.ocp.constraints import World
 from multimodal_to.ocp.guess import standing_posture
-from multimodal_to.ocp.scenario import Scenario, Start, Terminal, Vector3
-
-Array = NDArray[np.float64]
+from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

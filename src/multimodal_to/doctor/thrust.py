@@ -23,8 +23,11 @@ def weight(task: Task) -> Iterator[Symptom]:
     robot, when = task.robot, " and ".join(task.hovers)
     if not robot.jets:
         why = f"{robot.name} has none" if task.scenario.jets else "the scenario leaves them off (jets = false)"
-        yield error("thrust", f"the robot has to hover at the {when} without jets: {why}",
-                    "give it jets, or another start or terminal")  # fmt: skip
+        yield error(
+            "thrust",
+            f"the robot has to hover at the {when} without jets: {why}",
+            "give it jets, or another start or terminal",
+        )
     elif not task.lifts:
         yield error(
             "thrust",
@@ -49,10 +52,14 @@ def spool_up_time(task: Task) -> Iterator[Symptom]:
     have = f"{scenario.knots} intervals of up to {step:g} s"
     if needed > task.longest + 1e-9:
         least = f"knots = {int(np.ceil(needed / step))} or " if enough.size else "more knots or "
-        yield error("spool-up", f"{found} at most {task.longest:.3g} s long ({have})",
-                    f"allow {least}a longer interval_max")  # fmt: skip
+        yield error(
+            "spool-up", f"{found} at most {task.longest:.3g} s long ({have})", f"allow {least}a longer interval_max"
+        )
     elif needed > _HURRY * task.longest:
-        yield warning("spool-up", f"{found} at most {task.longest:.3g} s long ({have}), which leaves little",
-                      "allow more knots or a longer interval_max")  # fmt: skip
+        yield warning(
+            "spool-up",
+            f"{found} at most {task.longest:.3g} s long ({have}), which leaves little",
+            "allow more knots or a longer interval_max",
+        )
     else:
         yield note("spool-up", f"{found} up to {task.longest:.3g} s long")

@@ -10,8 +10,8 @@ import numpy as np
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.task import Task
 from multimodal_to.models.terrain import FlatGround
-from multimodal_to.ocp.scenario import Terminal
 from multimodal_to.ocp.variables import CONTACT_REACH
+from multimodal_to.scenarios.scenario import Terminal
 
 _LIMBS = 0.15
 """How far limbs may carry the CoM beside the base [m], whose speed alone is limited; generous."""
@@ -87,8 +87,11 @@ def leap(task: Task) -> Iterator[Symptom]:
         lift_off, climb = math.sqrt(2 * gravity * rise), math.sqrt(2 * rise / gravity)
         found = f"{label}, {height:g} m, is {rise:.3g} m above where feet on the ground let the CoM be; a jump there"
         if task.stands_at_end and 2 * climb > task.longest:
-            yield error("leap", f"{found} and back takes {2 * climb:.2g} s, and the horizon is at most "
-                        f"{task.longest:.3g} s long", "allow more knots or a longer interval_max")  # fmt: skip
+            yield error(
+                "leap",
+                f"{found} and back takes {2 * climb:.2g} s, and the horizon is at most {task.longest:.3g} s long",
+                "allow more knots or a longer interval_max",
+            )
         elif lift_off > scenario.base_speed_max:
             certain = rise - _LIMBS > scenario.base_speed_max * climb
             yield (error if certain else warning)(

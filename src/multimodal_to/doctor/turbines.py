@@ -6,11 +6,9 @@ from collections.abc import Sequence
 
 import casadi as cs
 import numpy as np
-from numpy.typing import NDArray
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.models.jet import Jet
-
-Array = NDArray[np.float64]
 
 _THRUSTS, _THROTTLES = 801, 101  # how fine thrust and throttle are looked at
 

@@ -11,9 +11,9 @@ import numpy as np
 from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
 from multimodal_to.doctor.task import Task
 from multimodal_to.errors import ModelError
-from multimodal_to.ocp.scenario import Weights
-from multimodal_to.ocp.solvers import Ipopt
 from multimodal_to.ocp.variables import INTERVAL_SCALE, SCALES
+from multimodal_to.scenarios.scenario import Weights
+from multimodal_to.solving.solvers import Ipopt
 
 _FAINT = Ipopt().tolerance ** 2
 """Share of the greatest cost below which one is lost: costs are squares, and the solver stops at its tolerance."""
@@ -35,8 +35,11 @@ def groups(task: Task) -> Iterator[Symptom]:
         else:
             members.update(task.robot.joint_groups[group])
     if twice := [name for name, count in members.items() if count > 1]:
-        yield warning("weights", f"weights.joint_velocities weighs {', '.join(twice)} by more than one group, and the "
-                      "last one counts alone", "name groups that do not overlap")  # fmt: skip
+        yield warning(
+            "weights",
+            f"weights.joint_velocities weighs {', '.join(twice)} by more than one group, and the last one counts alone",
+            "name groups that do not overlap",
+        )
 
 
 def costs(task: Task) -> Iterator[Symptom]:
@@ -47,8 +50,11 @@ def costs(task: Task) -> Iterator[Symptom]:
         if idle and task.scenario.jets:
             yield note("weights", f"{', '.join(idle)} weigh nothing: {task.robot.name} has no jets")
     if not sizes:
-        yield warning("weights", "no cost has a weight, so that any motion that is possible is as good as another",
-                      "give weights to what matters")  # fmt: skip
+        yield warning(
+            "weights",
+            "no cost has a weight, so that any motion that is possible is as good as another",
+            "give weights to what matters",
+        )
         return
     greatest = max(sizes, key=lambda name: sizes[name])
     for name, size in sizes.items():

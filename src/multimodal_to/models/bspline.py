@@ -8,11 +8,8 @@ from __future__ import annotations
 
 import casadi as cs
 import numpy as np
-from numpy.typing import NDArray
 
-from multimodal_to.adam.spatial import SX
-
-Array = NDArray[np.float64]
+from multimodal_to.adam.spatial import SX, Array
 
 LEAST_NODES = 4
 """Along each axis, for the not-a-knot conditions at both ends."""

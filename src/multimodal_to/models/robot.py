@@ -10,15 +10,13 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from multimodal_to.adam import KinDynComputations
+from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
+from multimodal_to.files.reading import Table, read_toml
 from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import Jet, JetModel
-from multimodal_to.reading import Table, read_toml
-
-Array = NDArray[np.float64]
 
 ROBOT_FILE = "robot.toml"
 
@@ -171,9 +169,16 @@ def _robot(table: Table, folder: Path) -> Robot:
     for part in (contact, home, table):
         part.done()
     return Robot(
-        name=name, urdf=urdf, kindyn=kindyn, joint_groups=MappingProxyType(joint_groups), joint_limits=limits,
-        contacts=contacts, friction=friction, jets=jets, home=posture,
-    )  # fmt: skip
+        name=name,
+        urdf=urdf,
+        kindyn=kindyn,
+        joint_groups=MappingProxyType(joint_groups),
+        joint_limits=limits,
+        contacts=contacts,
+        friction=friction,
+        jets=jets,
+        home=posture,
+    )
 
 
 def _refuse_repeated(kind: str, names: Sequence[str]) -> None:
@@ -214,9 +219,14 @@ def _jets(table: Table) -> tuple[Jet, ...]:
         if model not in models:
             raise ModelError(unknown("jet model", model, models))
         throttle_min, throttle_max = entry.numbers("throttle", 2)
-        jet = Jet(name=entry.text("name"), frame=entry.text("frame"), model=models[model],
-                  thrust_max=entry.number("thrust_max"), throttle_min=float(throttle_min),
-                  throttle_max=float(throttle_max))  # fmt: skip
+        jet = Jet(
+            name=entry.text("name"),
+            frame=entry.text("frame"),
+            model=models[model],
+            thrust_max=entry.number("thrust_max"),
+            throttle_min=float(throttle_min),
+            throttle_max=float(throttle_max),
+        )
         entry.done()
         if not (jet.thrust_max > 0 and throttle_min < throttle_max):
             raise ModelError(f"jet '{jet.name}': expected a positive thrust_max and a throttle range that rises")

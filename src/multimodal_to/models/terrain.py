@@ -15,13 +15,11 @@ from typing import Protocol
 
 import casadi as cs
 import numpy as np
-from numpy.typing import NDArray
 
-from multimodal_to.adam.spatial import SX
+from multimodal_to.adam.spatial import SX, Array
 from multimodal_to.errors import InputError
 from multimodal_to.models import bspline
 
-Array = NDArray[np.float64]
 Vector2 = tuple[float, float]
 
 
@@ -160,13 +158,17 @@ class Stairs(Relief):
         _finite("edges", *self.edges)
         _finite("heights", *self.heights)
         if not self.edges or len(self.heights) != len(self.edges) + 1:
-            raise InputError(f"stairs have {len(self.edges)} edges and {len(self.heights)} heights; expected at least "
-                             "one edge, and one height more than edges")  # fmt: skip
+            raise InputError(
+                f"stairs have {len(self.edges)} edges and {len(self.heights)} heights; expected at least "
+                "one edge, and one height more than edges"
+            )
         if not 0 < self.width < math.inf:
             raise InputError(f"the width of the stairs' ramps is {self.width} m; expected a positive number")
         if min(np.diff(self.edges), default=math.inf) < self.width:
-            raise InputError(f"the edges of the stairs are {self.edges} m; expected each at least a ramp's width, "
-                             f"{self.width} m, beyond the one before")  # fmt: skip
+            raise InputError(
+                f"the edges of the stairs are {self.edges} m; expected each at least a ramp's width, "
+                f"{self.width} m, beyond the one before"
+            )
 
     def height_and_slopes(self, x: SX, y: SX) -> tuple[SX, SX, SX]:
         """Return h [m] and the slopes [1]; about 20 operations for each edge."""
@@ -203,8 +205,10 @@ class HeightField(Relief):
         lengths = {len(row) for row in self.heights}
         if len(lengths) != 1 or min(len(self.heights), *lengths) < bspline.LEAST_NODES:
             least = bspline.LEAST_NODES
-            raise InputError(f"the height field has {len(self.heights)} rows of {sorted(lengths)} heights; expected "
-                             f"rows of one length, and at least {least} by {least}")  # fmt: skip
+            raise InputError(
+                f"the height field has {len(self.heights)} rows of {sorted(lengths)} heights; expected "
+                f"rows of one length, and at least {least} by {least}"
+            )
         if (nodes := len(self.heights) * len(self.heights[0])) > MOST_NODES:
             raise InputError(f"the height field has {nodes} nodes; expected at most {MOST_NODES}")
         _finite("heights", *(number for row in self.heights for number in row))

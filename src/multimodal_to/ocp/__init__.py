@@ -1,26 +1,5 @@
-"""The optimal control problem: scenarios, variables, constraints and costs, their transcription, and its solution."""
+"""The optimal control problem: variables, constraints and costs, their transcription, and the start guess."""
 
-from multimodal_to.ocp.elastic import Relaxation, relax
-from multimodal_to.ocp.misses import Miss
 from multimodal_to.ocp.problem import Problem, build, precompile
-from multimodal_to.ocp.scenario import Scenario, Start, Terminal, Weights
-from multimodal_to.ocp.solution import Iterate, Solution, solve
-from multimodal_to.ocp.solvers import Ipopt, Status
 
-__all__ = [
-    "Ipopt",
-    "Iterate",
-    "Miss",
-    "Problem",
-    "Relaxation",
-    "Scenario",
-    "Solution",
-    "Start",
-    "Status",
-    "Terminal",
-    "Weights",
-    "build",
-    "precompile",
-    "relax",
-    "solve",
-]
+__all__ = ["Problem", "build", "precompile"]

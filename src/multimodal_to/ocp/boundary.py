@@ -8,8 +8,8 @@ from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.constraints import KnotRows
 from multimodal_to.ocp.guess import contact_positions
-from multimodal_to.ocp.scenario import Scenario, Start, Terminal
 from multimodal_to.ocp.variables import Bounds
+from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 
 START_ROWS: dict[Start, tuple[KnotRows, ...]] = {
     Start.STANDING: (constraints.friction_cone, constraints.static_equilibrium),

@@ -20,8 +20,8 @@ from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Remembered, Surface
 from multimodal_to.ocp.integrators import gap, rotation_gap
-from multimodal_to.ocp.scenario import Scenario
 from multimodal_to.ocp.variables import CONTACT_REACH, JET_REACH, Knot
+from multimodal_to.scenarios.scenario import Scenario
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,8 +109,11 @@ def non_penetration(knot: Knot, world: World) -> Rows:
     """d(p_i) ≥ 0 (eq. 18)."""
     return Rows(
         expression=cs.vertcat(*(world.surface.distance(point) for point in knot.points)),
-        lower=0.0, upper=np.inf, unit="m", of="contact",
-    )  # fmt: skip
+        lower=0.0,
+        upper=np.inf,
+        unit="m",
+        of="contact",
+    )
 
 
 def friction_cone(knot: Knot, world: World) -> Rows:

@@ -8,11 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from multimodal_to.ocp.scenario import Scenario, Terminal
-
-Array = NDArray[np.float64]
+from multimodal_to.adam.spatial import Array
+from multimodal_to.scenarios.scenario import Scenario, Terminal
 
 SWING = 0.65  # share of a step's time in which its foot is in the air [1]
 LIFT = 0.04  # height of a swing [m]

@@ -6,18 +6,16 @@ from collections.abc import Sequence
 
 import casadi as cs
 import numpy as np
-from numpy.typing import NDArray
 
 from multimodal_to.adam import centroidal, quaternion
 from multimodal_to.adam.kinematics import Pose, forward_kinematics
+from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Surface, heights_below
 from multimodal_to.ocp.gait import steps
-from multimodal_to.ocp.scenario import Scenario, Start, Terminal, Vector3
 from multimodal_to.ocp.variables import Layout
-
-Array = NDArray[np.float64]
+from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 
 _CONTACT_TOLERANCE = 1e-6
 """A sole counts as on the ground below this height [m]: more corners than a plane needs make it overdetermined."""

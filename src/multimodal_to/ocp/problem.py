@@ -10,20 +10,19 @@ import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError, ScenarioError
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.ocp import compiled
 from multimodal_to.ocp.boundary import set_boundary
 from multimodal_to.ocp.constraints import World
 from multimodal_to.ocp.guess import standing_posture, start_guess
-from multimodal_to.ocp.scenario import Scenario, Start, Terminal
 from multimodal_to.ocp.stages import NamedStage, collect
 from multimodal_to.ocp.transcription import Nlp, assemble
 from multimodal_to.ocp.variables import INTERVAL_SCALE, Bounds, Layout, ranges
-from multimodal_to.resampling import resample
+from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 from multimodal_to.trajectory import QUANTITIES, Trajectory
-
-Array = NDArray[np.float64]
+from multimodal_to.trajectory.resampling import resample
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -232,9 +231,12 @@ def _row_bounds(stages: Sequence[NamedStage]) -> tuple[Array, Array, dict[str, R
             lower[here], upper[here] = rows.lower / rows.scale, rows.upper / rows.scale
             index = (first + np.arange(offset, offset + count)[:, None] + height * np.arange(repeats)).ravel()
             here_too = RowSet(
-                unit=rows.unit, index=index, knots=np.tile(named.knots, count),
-                components=np.repeat(np.array(rows.components, dtype=np.str_), repeats), scale=rows.scale,
-            )  # fmt: skip
+                unit=rows.unit,
+                index=index,
+                knots=np.tile(named.knots, count),
+                components=np.repeat(np.array(rows.components, dtype=np.str_), repeats),
+                scale=rows.scale,
+            )
             sets[name] = sets[name].joined(here_too) if name in sets else here_too
             offset += count
         low.append(np.tile(lower, repeats))

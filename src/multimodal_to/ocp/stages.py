@@ -10,17 +10,15 @@ import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
-from multimodal_to.adam.spatial import SX
+from multimodal_to.adam.spatial import SX, Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.ocp import constraints, costs
 from multimodal_to.ocp.boundary import END_ROWS, START_ROWS
 from multimodal_to.ocp.constraints import IntervalRows, KnotRows, Rows, World
 from multimodal_to.ocp.naming import components
-from multimodal_to.ocp.scenario import Scenario, Weights
 from multimodal_to.ocp.transcription import Stage
 from multimodal_to.ocp.variables import INTERVAL_SCALE, Bounds, Knot, Layout
-
-Array = NDArray[np.float64]
+from multimodal_to.scenarios.scenario import Scenario, Weights
 
 AT_KNOTS: tuple[KnotRows, ...] = (
     constraints.com_kinematics,

@@ -54,9 +54,9 @@ class Stage:
     def positions(self, size: int, last: int) -> Integers:
         """Return where the stage's arguments stand among all variables, (arguments, repeats)."""
         local = np.arange(size)[:, None]
-        return np.vstack([
-            local + size * self.starts, local + size * (self.starts + 1), np.full((1, self.repeats), last)
-        ])  # fmt: skip
+        return np.vstack(
+            [local + size * self.starts, local + size * (self.starts + 1), np.full((1, self.repeats), last)]
+        )
 
     def row_function(self) -> cs.Function:
         """Return (z, z⁺, Δt) → rows."""
@@ -174,7 +174,7 @@ def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
         ),
         hessian=_hessian(x, p, factor, multipliers, hessians.matrix(count, count)),
         cost_hessian=_hessian(x, p, factor, multipliers, cost_hessians.matrix(count, count)),
-    )  # fmt: skip
+    )
 
 
 def _mapped(function: cs.Function, repeats: int) -> cs.Function:

@@ -8,17 +8,14 @@ from typing import Any
 
 import casadi as cs
 import numpy as np
-from numpy.typing import NDArray
 
 from multimodal_to.adam import quaternion
 from multimodal_to.adam.kinematics import Pose, forward_kinematics
-from multimodal_to.adam.spatial import SX
+from multimodal_to.adam.spatial import SX, Array
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Robot
-from multimodal_to.ocp.scenario import Scenario
+from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import QUANTITIES
-
-Array = NDArray[np.float64]
 
 SCALES = {
     "com_position": 1.0,

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from multimodal_to.derived import FLIGHT_FORCE
+from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.plotting.style import (
     COLOURS,
@@ -19,8 +19,9 @@ from multimodal_to.plotting.style import (
     legend_above,
     new_figure,
     runs_of,
-)  # fmt: skip
-from multimodal_to.trajectory import Array, Trajectory
+)
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import FLIGHT_FORCE
 
 _BAR = 0.8  # of the height that a contact point has in the timeline
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from multimodal_to.derived import vertical_thrust
 from multimodal_to.models.robot import Robot
 from multimodal_to.plotting.style import (
     COLOURS,
@@ -19,8 +18,9 @@ from multimodal_to.plotting.style import (
     legend_above,
     new_figure,
     runs_of,
-)  # fmt: skip
+)
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import vertical_thrust
 
 
 def plot_forces(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
 from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
-from multimodal_to.derived import generalised_forces
+from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.plotting.style import (
     SMALL,
@@ -22,7 +22,8 @@ from multimodal_to.plotting.style import (
     pad,
     runs_of,
 )
-from multimodal_to.trajectory import Array, Trajectory
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import generalised_forces
 
 _COLUMNS = 6
 _CELL = (2.15, 1.55)  # [inch]
@@ -41,8 +42,15 @@ def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
     figure = new_figure(runs, "joints", (_COLUMNS * _CELL[0], (rows + 2.1) * _CELL[1]))
     upper, lower = np.asarray(figure.subfigures(2, 1, height_ratios=[rows, 2.1]))
     limits = robot.joint_limits
-    _cells(upper, runs, [run.trajectory.joint_positions for run in runs], "position [rad]", limits.lower, limits.upper,
-           whole_range=True)  # fmt: skip
+    _cells(
+        upper,
+        runs,
+        [run.trajectory.joint_positions for run in runs],
+        "position [rad]",
+        limits.lower,
+        limits.upper,
+        whole_range=True,
+    )
     _speeds(lower, robot, runs)
     return figure
 
@@ -65,9 +73,15 @@ def plot_torques(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] 
 
 
 def _cells(
-    figure: Figure | SubFigure, runs: Sequence[Run], values: Sequence[Array], unit: str, lower: Array, upper: Array, *,
+    figure: Figure | SubFigure,
+    runs: Sequence[Run],
+    values: Sequence[Array],
+    unit: str,
+    lower: Array,
+    upper: Array,
+    *,
     whole_range: bool,
-) -> None:  # fmt: skip
+) -> None:
     """Draw one small panel for each joint; NaN limits are none."""
     names = runs[0].robot.joint_names
     rows = -(-len(names) // _COLUMNS)
@@ -107,9 +121,15 @@ def _speeds(figure: SubFigure, robot: Robot, runs: Sequence[Run]) -> None:
         finish([axes], 0.1)
         _tick(axes, bottom=True)
         axes.legend(
-            loc="upper center", bbox_to_anchor=(0.5, -0.24), ncols=2, frameon=False, fontsize="xx-small",
-            handlelength=1.4, columnspacing=0.8, borderpad=0.0,
-        )  # fmt: skip
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.24),
+            ncols=2,
+            frameon=False,
+            fontsize="xx-small",
+            handlelength=1.4,
+            columnspacing=0.8,
+            borderpad=0.0,
+        )
     figure.supylabel("speed [rad/s]", fontsize="medium")
 
 

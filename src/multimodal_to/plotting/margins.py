@@ -9,12 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from multimodal_to.audit import Audit, audit
-from multimodal_to.derived import contact_products
-from multimodal_to.findings import Finding
+from multimodal_to.auditing.audit import Audit, audit
+from multimodal_to.auditing.findings import Finding
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
-from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.plotting.style import (
     COLOURS,
     LIMIT,
@@ -25,8 +23,10 @@ from multimodal_to.plotting.style import (
     legend_above,
     new_figure,
     runs_of,
-)  # fmt: skip
+)
+from multimodal_to.scenarios.data import stored
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import contact_products
 
 _FLOOR, _PRODUCT_FLOOR = 1e-6, 1e-8  # of what is drawn on the logarithmic axes
 _FAILED = "#d62728"
@@ -64,11 +64,18 @@ def _draw_products(axes: Axes, runs: Sequence[Run]) -> None:
         for product, colour, label in zip(products, COLOURS, labels, strict=False):
             largest = product.max(axis=0, initial=0.0)
             axes.semilogy(
-                run.time, np.maximum(largest, _PRODUCT_FLOOR), color=colour, linestyle=run.style,
+                run.time,
+                np.maximum(largest, _PRODUCT_FLOOR),
+                color=colour,
+                linestyle=run.style,
                 label=label if number == 0 else None,
-            )  # fmt: skip
-    bounds = [bound for scenario in map(stored, (run.trajectory for run in runs)) if scenario is not None
-              for bound in (scenario.complementarity_max, math.sqrt(2.0) * scenario.sliding_max)]  # fmt: skip
+            )
+    bounds = [
+        bound
+        for scenario in map(stored, (run.trajectory for run in runs))
+        if scenario is not None
+        for bound in (scenario.complementarity_max, math.sqrt(2.0) * scenario.sliding_max)
+    ]
     draw_limits(axes, set(bounds), "bounds")
     axes.set_ylim(_PRODUCT_FLOOR, max(1e-3, 3.0 * axes.get_ylim()[1]))
     axes.set_ylabel("largest product [N m]")
@@ -88,10 +95,16 @@ def _draw_findings(axes: Axes, runs: Sequence[Run], reports: Sequence[Audit]) ->
         highest = max(highest, shares.max(initial=0.0))
         places = [list(rows).index(finding.name) + (number - (len(runs) - 1) / 2.0) * thickness for finding in own]
         axes.barh(
-            places, np.maximum(shares, _FLOOR) - _FLOOR, left=_FLOOR, height=0.9 * thickness,
+            places,
+            np.maximum(shares, _FLOOR) - _FLOOR,
+            left=_FLOOR,
+            height=0.9 * thickness,
             color=["0.55" if finding.holds else _FAILED for finding in own],
-            alpha=1.0 - 0.2 * number, hatch="" if number == 0 else "/" * (2 * number), edgecolor="white", linewidth=0.0,
-        )  # fmt: skip
+            alpha=1.0 - 0.2 * number,
+            hatch="" if number == 0 else "/" * (2 * number),
+            edgecolor="white",
+            linewidth=0.0,
+        )
     axes.set_yticks(range(len(rows)), list(rows.values()), fontsize="x-small")
     axes.set_xscale("log")
     axes.set_xlim(_FLOOR, 10.0 * highest)

@@ -13,11 +13,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from multimodal_to.derived import flight_phases
+from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError, OutputError
+from multimodal_to.files.writing import whole
 from multimodal_to.models.robot import Robot
-from multimodal_to.trajectory import Array, Trajectory
-from multimodal_to.writing import whole
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import flight_phases
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """What a figure can be saved as."""
@@ -88,9 +89,12 @@ def draw_lines(axes: Axes, runs: Sequence[Run], values: Iterable[Array], names: 
         for index, row in enumerate(rows):
             style = run.style if len(runs) > 1 else STYLES[index % len(STYLES)] if len(rows) <= len(STYLES) else "-"
             axes.plot(
-                run.time, row, color=COLOURS[index % len(COLOURS)], linestyle=style,
+                run.time,
+                row,
+                color=COLOURS[index % len(COLOURS)],
+                linestyle=style,
                 label=labels[index] if number == 0 and index < len(labels) else None,
-            )  # fmt: skip
+            )
 
 
 def draw_limits(axes: Axes, values: Iterable[float], label: str | None) -> None:

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.urdf import parse_urdf
-from multimodal_to.derived import frame_poses
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.meshes import shaded
 from multimodal_to.replay.scene import Y_TO_Z, Scene, SmoothMesh, quaternions, shapes
 from multimodal_to.replay.visuals import Appearance, Visual
-from multimodal_to.trajectory import Array, Trajectory
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import frame_poses
 
 Drawn = tuple[Any, Any, Array]
 """Geometry, material and transform of a visual, as the scene takes them."""

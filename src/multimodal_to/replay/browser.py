@@ -24,10 +24,18 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 """Programs that are looked for, in this order, where the environment's CHROME_PATH names none."""
 
 _OPTIONS = (
-    "--headless=new", "--no-first-run", "--hide-scrollbars", "--mute-audio", "--enable-unsafe-swiftshader",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--disable-dev-shm-usage", "--remote-debugging-port=0", "--force-device-scale-factor=1",
-)  # fmt: skip
+    "--headless=new",
+    "--no-first-run",
+    "--hide-scrollbars",
+    "--mute-audio",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-dev-shm-usage",
+    "--remote-debugging-port=0",
+    "--force-device-scale-factor=1",
+)
 _PATIENCE = 120.0  # [s]
 
 
@@ -122,8 +130,9 @@ def open_browser(size: tuple[int, int]) -> Iterator[Page]:
         try:
             process = subprocess.Popen(
                 [program, *_OPTIONS, *sandbox, window, f"--user-data-dir={profile}", "about:blank"],
-                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            )  # fmt: skip
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
         except OSError as error:
             raise OutputError(f"'{program}' does not start: {error.strerror or error}") from error
         try:
@@ -132,8 +141,11 @@ def open_browser(size: tuple[int, int]) -> Iterator[Page]:
                 page = Page(socket)
                 page.call(
                     "Emulation.setDeviceMetricsOverride",
-                    width=size[0], height=size[1], deviceScaleFactor=1, mobile=False,
-                )  # fmt: skip
+                    width=size[0],
+                    height=size[1],
+                    deviceScaleFactor=1,
+                    mobile=False,
+                )
                 yield page
         except (WebSocketException, TimeoutError, ConnectionError) as error:
             raise OutputError(f"the browser '{program}' stopped answering: {error}") from error

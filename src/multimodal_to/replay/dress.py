@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import ModelError, unknown
-from multimodal_to.reading import Table, read_toml
+from multimodal_to.files.reading import Table, read_toml
 from multimodal_to.replay.meshes import package_file
-from multimodal_to.trajectory import Array
 
 DRESS_FILE = "dress.toml"
 

@@ -7,9 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.scene import Y_TO_Z, Scene, SmoothMesh, shapes, translation, turns_from_z
-from multimodal_to.trajectory import Array, Trajectory
+from multimodal_to.trajectory import Trajectory
 
 FLAME_LENGTH = 0.45
 """Length of the flame of the robot's strongest jet at its greatest thrust; others in proportion to their thrust [m]."""

@@ -9,8 +9,8 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.replay.bodies import draw_links, draw_visuals, drawn, faded, link_paths, link_poses
 from multimodal_to.replay.scene import Scene, shapes
 from multimodal_to.replay.visuals import Appearance
-from multimodal_to.resampling import resample
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.resampling import resample
 
 GHOST_OPACITY = 0.35
 GHOST_COLOUR = 0x7A3FB5

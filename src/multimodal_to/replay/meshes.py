@@ -13,8 +13,8 @@ from urllib.parse import unquote
 import numpy as np
 import trimesh
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import MultimodalError
-from multimodal_to.trajectory import Array
 
 ROOT_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH")
 """Environment variables that list folders in which packages of meshes lie."""

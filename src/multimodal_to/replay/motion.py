@@ -8,19 +8,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multimodal_to.derived import frame_poses
+from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Surface, heights_below
-from multimodal_to.ocp.scenario_data import stored
 from multimodal_to.replay.bodies import draw_links, draw_visuals, drawn, faded, link_paths, link_poses
 from multimodal_to.replay.effects import draw_com, draw_com_trace, draw_contact_forces, draw_flames
 from multimodal_to.replay.ghost import draw_ghost, in_step
 from multimodal_to.replay.scene import Scene, meshcat
 from multimodal_to.replay.stage import View, draw_stage
 from multimodal_to.replay.visuals import Appearance, Visual
-from multimodal_to.resampling import resample
-from multimodal_to.trajectory import QUANTITIES, Array, Trajectory
+from multimodal_to.scenarios.data import stored
+from multimodal_to.trajectory import QUANTITIES, Trajectory
+from multimodal_to.trajectory.derived import frame_poses
+from multimodal_to.trajectory.resampling import resample
 
 FOLLOW_FROM = 0.6
 """The camera follows the CoM along the ground in motions that go farther than this [m]."""
@@ -48,9 +49,14 @@ class Picture:
 
 
 def draw_motion(
-    visualizer: meshcat.Visualizer, robot: Robot, trajectory: Trajectory, look: Appearance, *,
-    ghost: Trajectory | None = None, live: bool = False,
-) -> Picture:  # fmt: skip
+    visualizer: meshcat.Visualizer,
+    robot: Robot,
+    trajectory: Trajectory,
+    look: Appearance,
+    *,
+    ghost: Trajectory | None = None,
+    live: bool = False,
+) -> Picture:
     """Draw stage, robot, flames, contact forces and CoM, and set the animation that moves them, at true speed.
 
     A `ghost` is another motion of the robot, drawn faint; it begins with this one.

@@ -11,14 +11,15 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from multimodal_to.derived import flight_phases
+from multimodal_to.adam.spatial import Array
+from multimodal_to.files.writing import write_text
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.ghost import GHOST_COLOUR
 from multimodal_to.replay.motion import Picture, draw_motion, draw_still
 from multimodal_to.replay.scene import HOLD, Recorder, meshcat
 from multimodal_to.replay.visuals import appearance
-from multimodal_to.trajectory import Array, Trajectory
-from multimodal_to.writing import write_text
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import flight_phases
 
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
 _FLAME = ("#f58a24", "flame: thrust of a jet")
@@ -28,9 +29,13 @@ _FLIGHT = ("#d62728", "bar above the time: flight")
 
 
 def write_html(
-    robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *,
-    ghost: Trajectory | None = None, meshes: bool = True,
-) -> Path:  # fmt: skip
+    robot: Robot,
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    *,
+    ghost: Trajectory | None = None,
+    meshes: bool = True,
+) -> Path:
     """Write one page that plays the motion in a browser, from disk, with networking off; whole or not at all.
 
     Opened with ``#t=2.5`` at its address's end, it stands still at 2.5 s; ``#t=2.5&bare`` hides the panels as well.
@@ -49,9 +54,14 @@ def page(robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = Non
 
 
 def write_still_html(
-    robot: Robot, trajectory: Trajectory, times: Array, path: str | os.PathLike[str], *,
-    aspect: float, meshes: bool = True,
-) -> Path:  # fmt: skip
+    robot: Robot,
+    trajectory: Trajectory,
+    times: Array,
+    path: str | os.PathLike[str],
+    *,
+    aspect: float,
+    meshes: bool = True,
+) -> Path:
     """Write a page with the robot at several times [s] in one still scene, for a picture of that width over height.
 
     Raises:
@@ -79,8 +89,11 @@ def _player(
 ) -> str:
     phases = [] if picture.still or not trajectory.contact_names else flight_phases(trajectory)
     shown = {_FLAME: trajectory.jet_names, _ARROW: trajectory.contact_names, _COM: not picture.still, _FLIGHT: phases}
-    keys = [f'<div><span class="key" style="background: {colour}"></span>{text}</div>'
-            for (colour, text), some in shown.items() if some]  # fmt: skip
+    keys = [
+        f'<div><span class="key" style="background: {colour}"></span>{text}</div>'
+        for (colour, text), some in shown.items()
+        if some
+    ]
     if ghost is not None:
         text = f"faint, and its line: {html.escape(ghost.scenario)}"
         keys.append(f'<div><span class="key" style="background: #{GHOST_COLOUR:06x}"></span>{text}</div>')
@@ -92,7 +105,7 @@ def _player(
         duration=f"{trajectory.duration:.6f}",
         viewer=_VIEWER.read_text(encoding="utf-8"),
         scene=_json(_content(trajectory, recorder, picture)),
-    )  # fmt: skip
+    )
 
 
 def _content(trajectory: Trajectory, recorder: Recorder, picture: Picture) -> dict[str, Any]:

@@ -11,17 +11,18 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from multimodal_to.derived import flight_phases
+from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError, OutputError
+from multimodal_to.files.writing import whole
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.replay.browser import open_browser
 from multimodal_to.replay.motion import surface_of
 from multimodal_to.replay.page import write_html, write_still_html
 from multimodal_to.replay.scene import HOLD
-from multimodal_to.resampling import resample
-from multimodal_to.trajectory import Array, Trajectory
-from multimodal_to.writing import whole
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import flight_phases
+from multimodal_to.trajectory.resampling import resample
 
 GIF_SIZE, MP4_SIZE = (640, 560), (960, 720)  # [pixel]
 SNAPSHOT_SIZE = (400, 760)  # of each robot in a still scene [pixel]
@@ -30,9 +31,15 @@ _ROOM = 0.35  # between ghosts that stand where they were [m]
 
 
 def write_gif(
-    robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *,
-    rate: float = 12.5, size: tuple[int, int] = GIF_SIZE, ghost: Trajectory | None = None, meshes: bool = True,
-) -> Path:  # fmt: skip
+    robot: Robot,
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    *,
+    rate: float = 12.5,
+    size: tuple[int, int] = GIF_SIZE,
+    ghost: Trajectory | None = None,
+    meshes: bool = True,
+) -> Path:
     """Write the motion as a GIF that repeats, at true speed, of `rate` frames a second.
 
     Raises:
@@ -54,9 +61,15 @@ def write_gif(
 
 
 def write_mp4(
-    robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *,
-    rate: float = 25.0, size: tuple[int, int] = MP4_SIZE, ghost: Trajectory | None = None, meshes: bool = True,
-) -> Path:  # fmt: skip
+    robot: Robot,
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    *,
+    rate: float = 25.0,
+    size: tuple[int, int] = MP4_SIZE,
+    ghost: Trajectory | None = None,
+    meshes: bool = True,
+) -> Path:
     """Write the motion as an MP4 (H.264), at true speed, of `rate` frames a second; the last pose stands for a second.
 
     Raises:
@@ -70,9 +83,16 @@ def write_mp4(
     times = _frame_times(trajectory, rate)
     with whole(path) as draft:
         writer = imageio_ffmpeg.write_frames(
-            str(draft), size, fps=rate, codec="libx264", pix_fmt_in="rgb24", pix_fmt_out="yuv420p", quality=8,
-            macro_block_size=2, output_params=["-movflags", "+faststart"],
-        )  # fmt: skip
+            str(draft),
+            size,
+            fps=rate,
+            codec="libx264",
+            pix_fmt_in="rgb24",
+            pix_fmt_out="yuv420p",
+            quality=8,
+            macro_block_size=2,
+            output_params=["-movflags", "+faststart"],
+        )
         writer.send(None)
         try:
             frame = b""
@@ -87,9 +107,14 @@ def write_mp4(
 
 
 def write_snapshots(
-    robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *,
-    times: Iterable[float] | None = None, size: tuple[int, int] | None = None, meshes: bool = True,
-) -> Path:  # fmt: skip
+    robot: Robot,
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    *,
+    times: Iterable[float] | None = None,
+    size: tuple[int, int] | None = None,
+    meshes: bool = True,
+) -> Path:
     """Write one still picture (PNG) of the robot at several times [s]; `snapshot_times` without any.
 
     Raises:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import umsgpack
 
-from multimodal_to.trajectory import Array
+from multimodal_to.adam.spatial import Array
 
 with warnings.catch_warnings():  # meshcat imports a module of pyzmq that says it is deprecated
     warnings.simplefilter("ignore", DeprecationWarning)
@@ -18,18 +18,30 @@ with warnings.catch_warnings():  # meshcat imports a module of pyzmq that says i
     from meshcat.animation import Animation, AnimationClip, AnimationTrack, js_quaternion
 
 __all__ = [
-    "HOLD", "Y_TO_Z", "Command", "Recorder", "Scene", "SmoothMesh", "meshcat", "quaternions", "shapes", "translation",
+    "HOLD",
+    "Y_TO_Z",
+    "Command",
+    "Recorder",
+    "Scene",
+    "SmoothMesh",
+    "meshcat",
+    "quaternions",
+    "shapes",
+    "translation",
     "turns_from_z",
-]  # fmt: skip
+]
 
 HOLD = 1.0
 """The last pose stands this long before the motion starts again [s]."""
 
 _STILL = 1e-9  # a property that changes less than this needs no keyframes
 _TRACK_TYPES = {
-    "position": "vector3", "quaternion": "quaternion", "scale": "vector3", "visible": "boolean",
+    "position": "vector3",
+    "quaternion": "quaternion",
+    "scale": "vector3",
+    "visible": "boolean",
     "material.opacity": "number",
-}  # fmt: skip
+}
 Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 """Turns meshcat's cylinders, which are along y, to z."""
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.models.terrain import FlatGround, Surface
+from multimodal_to.models.terrain_mesh import patch
 from multimodal_to.replay.scene import Y_TO_Z, Command, Scene, SmoothMesh, shapes, translation
-from multimodal_to.terrain_mesh import patch
-from multimodal_to.trajectory import Array
 
 _GRID_SPACING, _GRID_CELLS = 0.25, 16  # of the ground around the motion, in cells from its middle [m]
 _TERRAIN_AROUND = 2.0  # how far terrain is drawn beyond what is seen at once [m]
@@ -67,8 +67,9 @@ def _draw_ground(scene: Scene, view: View, surface: Surface, reach: float) -> No
         up = np.cross(two - one, three - one)
         steep = up[:, 2] < _STEEP * np.linalg.norm(up, axis=1)
         for name, faces, colour in (
-            ("terrain", terrain.faces[~steep], _GROUND_COLOUR), ("steep_terrain", terrain.faces[steep], _STEEP_COLOUR)
-        ):  # fmt: skip
+            ("terrain", terrain.faces[~steep], _GROUND_COLOUR),
+            ("steep_terrain", terrain.faces[steep], _STEEP_COLOUR),
+        ):
             part = trimesh.Trimesh(terrain.vertices, faces)  # drops the vertices that it does not use
             if len(part.faces):
                 mesh = SmoothMesh(np.asarray(part.vertices), np.asarray(part.faces), np.asarray(part.vertex_normals))
@@ -104,11 +105,14 @@ def _overhead_light(reach: float) -> dict[str, Any]:
     return {
         "metadata": {"version": 4.5, "type": "Object"},
         "object": {
-            "uuid": "overhead-light", "type": "DirectionalLight", "color": 0xFFFFFF, "intensity": 0.42,
+            "uuid": "overhead-light",
+            "type": "DirectionalLight",
+            "color": 0xFFFFFF,
+            "intensity": 0.42,
             "matrix": translation(place).T.ravel().tolist(),
             "shadow": {"normalBias": 0.02, "mapSize": [2048, 2048], "radius": 3, "camera": camera},
         },
-    }  # fmt: skip
+    }
 
 
 def _grid(cells: int) -> Array:

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.urdf import parse_urdf
 from multimodal_to.errors import MultimodalError
 from multimodal_to.replay.dress import Dress, read_dress
 from multimodal_to.replay.meshes import MeshWarning, Part, load_parts, simplified
-from multimodal_to.trajectory import Array
 
 FACES = 110_000
 """Triangles of all meshes of a robot together; those of heavier robots are thinned out to about as many."""
@@ -83,10 +83,15 @@ def _shapes(
         problems[mesh.filename] = str(error)
         return []
     return [
-        Visual(link=link, name=name if len(parts) == 1 else f"{name}_{index}", transform=origin,
-               rgba=stated or part.rgba or PLAIN, part=part)
+        Visual(
+            link=link,
+            name=name if len(parts) == 1 else f"{name}_{index}",
+            transform=origin,
+            rgba=stated or part.rgba or PLAIN,
+            part=part,
+        )
         for index, part in enumerate(parts)
-    ]  # fmt: skip
+    ]
 
 
 def _stated_colour(visual: Any, palette: Mapping[str, Any]) -> tuple[float, ...] | None:

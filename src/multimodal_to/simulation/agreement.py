@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from multimodal_to.adam import quaternion
+from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.simulation.model import SimulationModel, build_model, mujoco_module
-from multimodal_to.trajectory import Array, Trajectory
+from multimodal_to.trajectory import Trajectory
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,9 +40,9 @@ def random_states(robot: Robot, count: int, seed: int = 0) -> States:
 
 def states_along(trajectory: Trajectory) -> States:
     """Return the states of a trajectory's knots but the first, with backward differences as accelerations."""
-    velocities = np.vstack([
-        trajectory.base_linear_velocity, trajectory.base_angular_velocity, trajectory.joint_velocities
-    ])  # fmt: skip
+    velocities = np.vstack(
+        [trajectory.base_linear_velocity, trajectory.base_angular_velocity, trajectory.joint_velocities]
+    )
     return States(
         positions=trajectory.base_position[:, 1:],
         quaternions_xyzw=trajectory.base_quaternion_xyzw[:, 1:],
@@ -59,9 +60,13 @@ def by_mujoco(simulation: SimulationModel, states: States) -> Array:
     for column in range(forces.shape[1]):
         velocity, acceleration = states.velocities[:, column], states.accelerations[:, column]
         simulation.set_state(
-            data, states.positions[:, column], states.quaternions_xyzw[:, column], states.joints[:, column],
-            velocity[:6], velocity[6:],
-        )  # fmt: skip
+            data,
+            states.positions[:, column],
+            states.quaternions_xyzw[:, column],
+            states.joints[:, column],
+            velocity[:6],
+            velocity[6:],
+        )
         mujoco.mj_kinematics(simulation.model, data)
         turn = data.xmat[1].reshape(3, 3)  # of the base, which is the first body after the world
         data.qacc[:3], data.qacc[3:6] = acceleration[:3], turn.T @ acceleration[3:6]

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.tree import Joint, Link
 from multimodal_to.adam.urdf import read_urdf
 from multimodal_to.errors import ModelError, OutputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Plane, Surface, frame_function, heights_below
-from multimodal_to.trajectory import Array
 
 TIME_STEP = 1e-3  # [s]
 POINT_RADIUS = 2e-3  # of the sphere at a contact point [m]
@@ -82,9 +82,13 @@ class SimulationModel:
 
 
 def build_model(
-    robot: Robot, surface: Surface | None = None, friction: float | None = None, *, middle: Array | None = None,
+    robot: Robot,
+    surface: Surface | None = None,
+    friction: float | None = None,
+    *,
+    middle: Array | None = None,
     reach: float = 3.0,
-) -> SimulationModel:  # fmt: skip
+) -> SimulationModel:
     """Return a robot on its ground.
 
     Args:
@@ -112,9 +116,16 @@ def build_model(
     mu = robot.friction if friction is None else friction
     for name in robot.contact_names:
         spec.body(name).add_geom(
-            name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[POINT_RADIUS, 0.0, 0.0], mass=0.0, condim=3,
-            friction=[mu, 0.0, 0.0], solref=[CONTACT_TIME, 1.0], contype=1, conaffinity=0,
-        )  # fmt: skip
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[POINT_RADIUS, 0.0, 0.0],
+            mass=0.0,
+            condim=3,
+            friction=[mu, 0.0, 0.0],
+            solref=[CONTACT_TIME, 1.0],
+            contype=1,
+            conaffinity=0,
+        )
     if surface is not None:
         _add_ground(mujoco, spec, surface, mu, np.zeros(2) if middle is None else middle, reach)
     _add_actuators(mujoco, spec, robot)
@@ -193,9 +204,13 @@ def _add_ground(mujoco: ModuleType, spec: Any, surface: Surface, mu: float, midd
         _, normal, tangents = (np.array(part) for part in frame_function(surface)(at))
         rotation = np.column_stack([tangents, normal])
         spec.worldbody.add_geom(
-            name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], quat=_quaternion(mujoco, rotation),
-            pos=at - POINT_RADIUS * normal.ravel(), **contact,
-        )  # fmt: skip
+            name="ground",
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            size=[0.0, 0.0, 1.0],
+            quat=_quaternion(mujoco, rotation),
+            pos=at - POINT_RADIUS * normal.ravel(),
+            **contact,
+        )
         return
     count = 2 * int(np.ceil(reach / CELL)) + 1
     steps = np.linspace(-reach, reach, count)
@@ -207,9 +222,12 @@ def _add_ground(mujoco: ModuleType, spec: Any, surface: Surface, mu: float, midd
     heights = heights - POINT_RADIUS / normals[2]
     low, span = float(heights.min()), float(max(np.ptp(heights), 1e-6))
     spec.add_hfield(
-        name="ground", nrow=count, ncol=count, size=[reach, reach, span, DEPTH],
+        name="ground",
+        nrow=count,
+        ncol=count,
+        size=[reach, reach, span, DEPTH],
         userdata=((heights - low) / span).tolist(),
-    )  # fmt: skip
+    )
     spec.worldbody.add_geom(
         name="ground", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="ground", pos=[*middle, low], **contact
     )
@@ -219,9 +237,13 @@ def _add_actuators(mujoco: ModuleType, spec: Any, robot: Robot) -> None:
     """Add a servo at each joint, and at each jet a force along −z of a site that is the jet's frame."""
     for name in robot.joint_names:
         spec.add_actuator(
-            name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name, gainprm=[STIFFNESS] + 9 * [0.0],
-            biastype=mujoco.mjtBias.mjBIAS_AFFINE, biasprm=[0.0, -STIFFNESS, -DAMPING] + 7 * [0.0],
-        )  # fmt: skip
+            name=name,
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            target=name,
+            gainprm=[STIFFNESS] + 9 * [0.0],
+            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            biasprm=[0.0, -STIFFNESS, -DAMPING] + 7 * [0.0],
+        )
     for jet in robot.jets:
         spec.body(jet.frame).add_site(name=jet.name)
         spec.add_actuator(

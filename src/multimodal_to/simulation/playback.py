@@ -11,15 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError, TrajectoryError
 from multimodal_to.models.jet import Jet
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
-from multimodal_to.ocp.scenario_data import stored
+from multimodal_to.scenarios.data import stored
 from multimodal_to.simulation.model import DAMPING, STIFFNESS, TIME_STEP, SimulationModel, build_model, mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
 from multimodal_to.simulation.stabiliser import Correction, Turbines, correct, rotation_vector
-from multimodal_to.trajectory import Array, Trajectory
+from multimodal_to.trajectory import Trajectory
 
 HOLD = 1.0  # how long the end of the plan is held [s]
 PERIOD = 4  # steps of the simulation between two decisions of the stabiliser [1]
@@ -64,17 +65,23 @@ def play(robot: Robot, plan: Trajectory, *, stabilise: bool = True, delay: float
     """
     if not 0.0 <= delay <= 1.0:
         raise InputError(f"the delay is {delay:g} intervals; expected 0 to 1")
-    names = ((robot.joint_names, plan.joint_names), (robot.contact_names, plan.contact_names),
-             (robot.jet_names, plan.jet_names))  # fmt: skip
+    names = (
+        (robot.joint_names, plan.joint_names),
+        (robot.contact_names, plan.contact_names),
+        (robot.jet_names, plan.jet_names),
+    )
     if any(ours != theirs for ours, theirs in names):
         raise TrajectoryError(f"the plan's joints, contact points or jets are not those of the robot '{robot.name}'")
     scenario = stored(plan)
     friction = robot.friction if scenario is None or scenario.friction is None else scenario.friction
     low, high = (getattr(plan.com_position[:2], end)(axis=1) for end in ("min", "max"))
     simulation = build_model(
-        robot, FlatGround() if scenario is None else scenario.surface, friction, middle=(low + high) / 2.0,
+        robot,
+        FlatGround() if scenario is None else scenario.surface,
+        friction,
+        middle=(low + high) / 2.0,
         reach=float((high - low).max()) / 2.0 + REACH,
-    )  # fmt: skip
+    )
     return _Player(simulation, plan, friction, stabilise, delay).run()
 
 
@@ -101,9 +108,13 @@ class _Player:
         plan, data, model = self._plan, self._data, self._simulation.model
         velocity = np.concatenate([plan.base_linear_velocity[:, 0], plan.base_angular_velocity[:, 0]])
         self._simulation.set_state(
-            data, plan.base_position[:, 0], plan.base_quaternion_xyzw[:, 0], plan.joint_positions[:, 0], velocity,
+            data,
+            plan.base_position[:, 0],
+            plan.base_quaternion_xyzw[:, 0],
+            plan.joint_positions[:, 0],
+            velocity,
             plan.joint_velocities[:, 0],
-        )  # fmt: skip
+        )
         rows: list[dict[str, Array]] = []
         for step in range(self._time.size):
             self._mujoco.mj_step1(model, data)
@@ -118,9 +129,13 @@ class _Player:
         fell = None if len(rows) == self._time.size else float(self._time[len(rows) - 1])
         rows += [rows[-1]] * (self._time.size - len(rows))
         return Playback(
-            robot=self._robot, plan=plan, reference=self._reference, time=self._time, fell=fell,
+            robot=self._robot,
+            plan=plan,
+            reference=self._reference,
+            time=self._time,
+            fell=fell,
             **{name: np.array([row[name] for row in rows]) for name in rows[0]},
-        )  # fmt: skip
+        )
 
     def _state(self) -> dict[str, Array]:
         data, simulation = self._data, self._simulation
@@ -128,12 +143,10 @@ class _Player:
         return {
             "com": data.subtree_com[1].copy(),
             "qpos": np.concatenate([data.qpos[:7], data.qpos[simulation.joint_positions]]),
-            "qvel": np.concatenate(
-                [data.qvel[:3], turn @ data.qvel[3:6], data.qvel[simulation.joint_velocities]]
-            ),
+            "qvel": np.concatenate([data.qvel[:3], turn @ data.qvel[3:6], data.qvel[simulation.joint_velocities]]),
             "thrust": self._thrust.copy(),
             "thrust_rate": self._rate.copy(),
-        }  # fmt: skip
+        }
 
     def _is_down(self, step: int) -> bool:
         wanted, data = self._reference, self._data

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multimodal_to.derived import base_poses, generalised_forces
+from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
-from multimodal_to.resampling import resample
-from multimodal_to.trajectory import Array, Trajectory
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import base_poses, generalised_forces
+from multimodal_to.trajectory.resampling import resample
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from multimodal_to.derived import base_poses, contact_points
+from multimodal_to.adam.spatial import Array
 from multimodal_to.simulation.playback import Playback
 from multimodal_to.simulation.stabiliser import rotation_vector
-from multimodal_to.trajectory import Array, Trajectory
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import base_poses, contact_points
 
 TOUCHING = 5.0
 """A foot that bears more than this stands [N]."""
@@ -50,10 +51,12 @@ def tracking(playback: Playback) -> Tracking:
     plan, robot, reference = playback.plan, playback.robot, playback.reference
     during = playback.time <= plan.duration
     com = np.linalg.norm(playback.com - reference.com, axis=1)
-    attitude = np.degrees([
-        np.linalg.norm(rotation_vector(wanted @ turn.T))
-        for wanted, turn in zip(reference.rotation, _rotations(playback.qpos), strict=True)
-    ])  # fmt: skip
+    attitude = np.degrees(
+        [
+            np.linalg.norm(rotation_vector(wanted @ turn.T))
+            for wanted, turn in zip(reference.rotation, _rotations(playback.qpos), strict=True)
+        ]
+    )
     joints = np.degrees(np.abs(playback.qpos[:, 7:] - reference.joints))[during].max(axis=0)
     thrust = np.abs(playback.thrust - reference.thrust)[during]
     return Tracking(
@@ -82,9 +85,11 @@ def _end(playback: Playback) -> str:
 
 def _rotations(qpos: Array) -> Array:
     w, x, y, z = qpos[:, 3:7].T
-    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]  # fmt: skip
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
     return np.array(rows).transpose(2, 0, 1)
 
 

@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.simulation.model import SimulationModel, mujoco_module
 from multimodal_to.simulation.reference import Reference
-from multimodal_to.trajectory import Array
 
 COM_STIFFNESS, COM_DAMPING = 6.0, 5.0  # K_x [1/s²], D_x [1/s]
 ATTITUDE_STIFFNESS, ATTITUDE_DAMPING = 16.0, 8.0  # K_R [1/s²], D_h [1/s]
@@ -73,9 +73,14 @@ class Turbines:
 
 
 def correct(
-    simulation: SimulationModel, data: Any, plan: Reference, step: int, turbines: Turbines, inertia: Array,
+    simulation: SimulationModel,
+    data: Any,
+    plan: Reference,
+    step: int,
+    turbines: Turbines,
+    inertia: Array,
     friction: float,
-) -> Correction:  # fmt: skip
+) -> Correction:
     """Return what to add to step `step` of the plan in the state of `data`, whose subtree velocities are known."""
     robot = simulation.robot
     com, points = data.subtree_com[1], data.geom_xpos[simulation.points]
@@ -150,9 +155,14 @@ def _axes(simulation: SimulationModel, data: Any) -> Array:
 
 
 def _thrusts(
-    simulation: SimulationModel, data: Any, wanted: Array, origin: Array, turbines: Turbines, planned: Array,
+    simulation: SimulationModel,
+    data: Any,
+    wanted: Array,
+    origin: Array,
+    turbines: Turbines,
+    planned: Array,
     weights: Array,
-) -> tuple[Array, Array]:  # fmt: skip
+) -> tuple[Array, Array]:
     """Return ΔT, and what the thrusts as they are leave of the wanted wrench about `origin`."""
     axes = _axes(simulation, data)
     wrenches = np.vstack([axes.T, np.cross(data.site_xpos[simulation.jets] - origin, axes).T])

@@ -1,0 +1,238 @@
+"""`audit`: whether a trajectory is physically true, from its arrays alone and by code that shares no solver row.
+
+Everything is recomputed in numpy from the saved quantities; only rigid-body quantities come from `robot.kindyn`, and
+CoM and angular momentum from its mass-matrix side (J_CMM), not from the recursion that the optimiser uses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
+from multimodal_to.adam.spatial import Array
+from multimodal_to.auditing.findings import Finding, Motion, largest, worst_of
+from multimodal_to.auditing.task import task_findings
+from multimodal_to.auditing.thrust import thrust_findings
+from multimodal_to.errors import InputError, unknown
+from multimodal_to.models.contact import FrictionCone
+from multimodal_to.models.robot import Robot
+from multimodal_to.models.terrain import FlatGround
+from multimodal_to.scenarios.data import stored
+from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import LOADED, flight_phases, generalised_forces, surface_frames
+
+FRICTION_LIMIT = {FrictionCone.PYRAMID: 1e-3, FrictionCone.SECOND_ORDER: 1e-2}
+"""By how much a force may be outside its cone [N]; a row of squares is met less sharply where the forces vanish."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Audit:
+    """The findings by property, and figures that describe the motion."""
+
+    findings: tuple[Finding, ...]
+    scenario: Scenario | None  # None: what was asked is not known, so start, end and ranges of the task are not judged
+    duration: float  # [s]
+    airborne: float  # longest phase of flight [s]
+    final_thrust_over_weight: float  # vertical, at the last knot [1]
+    allowances_used: tuple[str, ...]  # properties that hold only because the scenario allows them more
+
+    @property
+    def holds(self) -> bool:
+        """Return whether every property holds."""
+        return all(finding.holds for finding in self.findings)
+
+    def __getitem__(self, name: str) -> Finding:
+        """Return a finding by its property's name."""
+        return {finding.name: finding for finding in self.findings}[name]
+
+
+def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None) -> Audit:
+    """Check a trajectory against the physics of its robot.
+
+    Args:
+        robot: the robot that the trajectory is for.
+        trajectory: as loaded from its file.
+        scenario: what was asked, with its terrain and friction; by default the one that the trajectory keeps. If it
+            keeps none, the ground is taken as flat at height zero, with the robot's own friction as a pyramid.
+
+    Raises:
+        InputError: the trajectory is for another robot.
+    """
+    for label, here, there in (
+        ("joints", robot.joint_names, trajectory.joint_names),
+        ("contact points", robot.contact_names, trajectory.contact_names),
+        ("jets", robot.jet_names, trajectory.jet_names),
+    ):
+        if here != there:
+            raise InputError(f"the {label} of the trajectory are {there}; those of {robot.name} are {here}")
+    scenario = scenario or stored(trajectory)
+    phases = flight_phases(trajectory)
+    motion = Motion.of(robot, trajectory)
+    findings = (
+        *_kinematics(motion),
+        *_dynamics(motion),
+        *_torques(motion),
+        *_integration(motion),
+        *_jets(robot, trajectory),
+        *_contacts(motion, scenario),
+        *_limits(robot, trajectory),
+        *thrust_findings(robot, trajectory),
+        *(task_findings(motion, scenario) if scenario else ()),
+    )
+    allowed = _allow(findings, scenario.allowances) if scenario else findings
+    used = [own.name for own, wide in zip(findings, allowed, strict=True) if wide.holds and not own.holds]
+    return Audit(
+        findings=allowed,
+        scenario=scenario,
+        duration=trajectory.duration,
+        airborne=max((end - start for start, end in phases), default=0.0),
+        final_thrust_over_weight=float(motion.thrusts[:, -1, 2].sum() / robot.weight),
+        allowances_used=tuple(used),
+    )
+
+
+def _allow(findings: Sequence[Finding], allowances: Mapping[str, float]) -> tuple[Finding, ...]:
+    """Widen the limits of the properties that a scenario allows more."""
+    for name in allowances:
+        if name not in {finding.name for finding in findings}:
+            raise InputError(unknown("property to allow more of", name, [finding.name for finding in findings]))
+    return tuple(replace(finding, limit=max(finding.limit, allowances.get(finding.name, 0.0))) for finding in findings)
+
+
+def _kinematics(motion: Motion) -> list[Finding]:
+    robot, trajectory, count = motion.robot, motion.trajectory, motion.trajectory.time.size
+    side_by_side = np.hstack(list(motion.base))
+    com = np.array(robot.kindyn.CoM_position_fun().map(count)(side_by_side, trajectory.joint_positions))
+    matrices = np.array(
+        robot.kindyn.centroidal_momentum_matrix_fun().map(count)(side_by_side, trajectory.joint_positions)
+    ).reshape(6, count, -1)
+    velocities = np.vstack(
+        [trajectory.base_linear_velocity, trajectory.base_angular_velocity, trajectory.joint_velocities]
+    )
+    momentum = np.einsum("rkc,ck->rk", matrices, velocities)
+    points = motion.points.transpose(0, 2, 1).reshape(-1, count)
+    norms = np.linalg.norm(trajectory.base_quaternion_xyzw, axis=0)
+    by_contact = np.abs(points - trajectory.contact_positions).reshape(len(robot.contacts), 3, count).max(axis=1)
+    return [
+        worst_of("CoM consistency", "m", 1e-5, largest(com - trajectory.com_position)),
+        worst_of("momentum consistency", "kg m²/s", 1e-4, largest(momentum[3:] - trajectory.angular_momentum)),
+        worst_of("contact point consistency", "m", 1e-5, by_contact, robot.contact_names),
+        worst_of("quaternion norm", "1", 1e-6, np.abs(norms - 1)),
+    ]
+
+
+def _dynamics(motion: Motion) -> list[Finding]:
+    """Newton and Euler for the whole robot, at every knot; both rates are zero at the first."""
+    robot, trajectory = motion.robot, motion.trajectory
+    acting = np.concatenate([motion.contact_forces, motion.thrusts])
+    points = np.concatenate([motion.points, motion.thrust_points])
+    linear = acting.sum(axis=0) + robot.mass * robot.gravity - robot.mass * trajectory.com_acceleration.T
+    moments = np.cross(points - trajectory.com_position.T, acting).sum(axis=0)
+    return [
+        worst_of("force balance", "N", 1e-2, largest(linear.T)),
+        worst_of("moment balance", "N m", 1e-2, largest(moments.T - trajectory.angular_momentum_rate)),
+    ]
+
+
+def _torques(motion: Motion) -> list[Finding]:
+    """RNEA along the motion under all contact forces and thrusts: joint torques, and what is left for the base.
+
+    Accelerations are backward differences of the velocities, as the optimiser's backward Euler has them; placeholders
+    of effort limits limit nothing.
+    """
+    robot = motion.robot
+    generalised = generalised_forces(robot, motion.trajectory)
+    effort = np.where(robot.joint_limits.effort < EFFORT_PLACEHOLDER, robot.joint_limits.effort, np.inf)
+    beyond = np.abs(generalised[6:]) - effort[:, None]
+    return [
+        worst_of("torque beyond effort", "N m", 1e-3, beyond, robot.joint_names),
+        worst_of("unexplained base force", "N", 0.01 * robot.weight, largest(generalised[:3])),
+        worst_of("unexplained base moment", "N m", 1.0, largest(generalised[3:6])),
+    ]
+
+
+def _integration(motion: Motion) -> list[Finding]:
+    """Backward Euler: what a quantity gains over an interval is its rate at the end times Δt."""
+    trajectory, steps = motion.trajectory, np.diff(motion.trajectory.time)
+    findings = []
+    for name, rate, unit, limit in (
+        ("com_position", "com_velocity", "m", 1e-5),
+        ("com_velocity", "com_acceleration", "m/s", 1e-5),
+        ("angular_momentum", "angular_momentum_rate", "kg m²/s", 1e-5),
+        ("base_position", "base_linear_velocity", "m", 1e-5),
+        ("joint_positions", "joint_velocities", "rad", 1e-5),
+        ("contact_forces", "contact_force_rates", "N", 1e-3),
+        ("thrust", "thrust_rate", "N", 1e-3),
+        ("thrust_rate", "thrust_acceleration", "N/s", 1e-3),
+    ):
+        gaps = np.diff(getattr(trajectory, name), axis=1) - getattr(trajectory, rate)[:, 1:] * steps
+        findings.append(worst_of(f"gap of {name}", unit, limit, largest(gaps), first=1))
+    rotations = motion.base[:, :3, :3]
+    turned = rotations[1:] @ rotations[:-1].transpose(0, 2, 1)
+    gaps = turned - _rodrigues(trajectory.base_angular_velocity[:, 1:].T * steps[:, None])
+    findings.append(worst_of("gap of base orientation", "rad", 1e-5, np.abs(gaps).max(axis=(1, 2)), first=1))
+    return findings
+
+
+def _rodrigues(vectors: Array) -> Array:
+    """Return the rotation matrices of rotation vectors [rad], (count, 3) → (count, 3, 3)."""
+    angles = np.linalg.norm(vectors, axis=1)[:, None, None]
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    skews = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    first = np.sinc(angles / np.pi)
+    second = 0.5 * np.sinc(angles / (2 * np.pi)) ** 2
+    return np.asarray(np.eye(3) + first * skews + second * skews @ skews)
+
+
+def _jets(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+    accelerations = np.array(
+        [
+            jet.model.acceleration(trajectory.thrust[row], trajectory.thrust_rate[row], trajectory.throttle[row])
+            for row, jet in enumerate(robot.jets)
+        ]
+    ).reshape(len(robot.jets), trajectory.time.size)
+    residuals = np.abs(accelerations - trajectory.thrust_acceleration)
+    return [worst_of("thrust dynamics", "N/s²", 1e-3, residuals, robot.jet_names)]
+
+
+def _contacts(motion: Motion, scenario: Scenario | None) -> list[Finding]:
+    surface = scenario.surface if scenario else FlatGround()
+    friction = (scenario.friction if scenario else None) or motion.robot.friction
+    cone = scenario.friction_cone if scenario else FrictionCone.PYRAMID
+    points, forces = motion.points, motion.contact_forces
+    heights, normals, tangents = surface_frames(surface, points)
+    normal = np.einsum("ckx,ckx->ck", normals, forces)
+    along = np.einsum("ckxt,ckx->ckt", tangents, forces)
+    reached = np.abs(along).max(axis=2) if cone is FrictionCone.PYRAMID else np.linalg.norm(along, axis=2)
+    moves = np.diff(points, axis=1, prepend=points[:, :1])
+    slips = np.linalg.norm(np.einsum("ckxt,ckx->ckt", tangents, moves), axis=2)
+    names = motion.robot.contact_names
+    return [
+        worst_of("penetration", "m", 1e-5, -heights, names),
+        worst_of("pulling normal force", "N", 1e-3, -normal, names),
+        worst_of("friction beyond cone", "N", FRICTION_LIMIT[cone], reached - friction * normal, names),
+        worst_of("normal force × height", "N m", 0.01, normal * heights, names),
+        worst_of("slip under load", "m", 1e-3, np.where(normal > LOADED, slips, 0.0), names),
+    ]
+
+
+def _limits(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+    """How far quantities are beyond their limits; zero or less is within them."""
+    limits, jets = robot.joint_limits, robot.jets
+    joints, speeds = trajectory.joint_positions, np.abs(trajectory.joint_velocities)
+    beyond = np.maximum(joints - limits.upper[:, None], limits.lower[:, None] - joints)
+    thrust_max = np.array([jet.thrust_max for jet in jets]).reshape(-1, 1)
+    lowest = np.array([jet.throttle_min for jet in jets]).reshape(-1, 1)
+    highest = np.array([jet.throttle_max for jet in jets]).reshape(-1, 1)
+    thrust, throttle = trajectory.thrust, trajectory.throttle
+    return [
+        worst_of("joint range", "rad", 1e-6, beyond, robot.joint_names),
+        worst_of("joint speed", "rad/s", 1e-6, speeds - limits.speed[:, None], robot.joint_names),
+        worst_of("thrust range", "N", 1e-4, np.maximum(thrust - thrust_max, -thrust), robot.jet_names),
+        worst_of("throttle range", "%", 1e-4, np.maximum(throttle - highest, lowest - throttle), robot.jet_names),
+    ]

@@ -1,0 +1,78 @@
+"""What an audit works with: a motion with its forward kinematics, and findings, one for each property."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from multimodal_to.adam.spatial import Array
+from multimodal_to.models.robot import Robot
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import base_poses, contact_points, thrust_forces
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One property: its worst value on the horizon, where that is, and the limit it is held to."""
+
+    name: str
+    worst: float
+    unit: str
+    knot: int
+    body: str
+    limit: float
+
+    @property
+    def holds(self) -> bool:
+        """Return whether the worst value is within the limit."""
+        return self.worst <= self.limit
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """A trajectory with what forward kinematics says of it, in world axes."""
+
+    robot: Robot
+    trajectory: Trajectory
+    base: Array  # w_H_base, (knots + 1, 4, 4)
+    points: Array  # contact points [m], (contacts, knots + 1, 3)
+    thrust_points: Array  # where the jets push [m], (jets, knots + 1, 3)
+    thrusts: Array  # with what force [N], (jets, knots + 1, 3)
+
+    @classmethod
+    def of(cls, robot: Robot, trajectory: Trajectory) -> Motion:
+        """Return a trajectory with its forward kinematics."""
+        thrust_points, thrusts = thrust_forces(robot, trajectory)
+        return cls(
+            robot=robot,
+            trajectory=trajectory,
+            base=base_poses(trajectory),
+            points=contact_points(robot, trajectory),
+            thrust_points=thrust_points,
+            thrusts=thrusts,
+        )
+
+    @property
+    def contact_forces(self) -> Array:
+        """Return the contact forces [N], (contacts, knots + 1, 3)."""
+        return self.trajectory.per_contact("contact_forces").transpose(0, 2, 1)
+
+
+def worst_of(
+    name: str, unit: str, limit: float, values: Array, bodies: tuple[str, ...] = (), first: int = 0
+) -> Finding:
+    """Return the worst of values (bodies, knots from `first`), or (knots,)."""
+    table = np.atleast_2d(values)
+    if not table.size:
+        return Finding(name=name, worst=0.0, unit=unit, knot=first, body="", limit=limit)
+    row, column = np.unravel_index(int(np.argmax(table)), table.shape)
+    body = bodies[row] if bodies else ""
+    return Finding(
+        name=name, worst=float(table[row, column]), unit=unit, knot=int(column) + first, body=body, limit=limit
+    )
+
+
+def largest(vectors: Array) -> Array:
+    """Return the largest component by absolute value of (components, knots), per knot."""
+    return np.asarray(np.abs(vectors).max(axis=0, initial=0.0))

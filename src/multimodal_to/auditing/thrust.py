@@ -1,0 +1,66 @@
+"""Thrusts integrated again by an adaptive method, from the file's throttles: how far backward Euler is off."""
+
+from __future__ import annotations
+
+import casadi as cs
+import numpy as np
+
+from multimodal_to.adam.spatial import Array
+from multimodal_to.auditing.findings import Finding, worst_of
+from multimodal_to.models.robot import Robot
+from multimodal_to.trajectory import Trajectory
+
+INTERVAL_LIMIT = 10.0
+"""Largest difference that an interval of backward Euler may make to a thrust [N]; generous: a jet's greatest is 160."""
+HORIZON_LIMIT = 20.0
+"""Largest difference over the whole horizon [N]."""
+_TOLERANCE = 1e-8  # of the integrator, relative and absolute
+
+
+def thrust_findings(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+    """Compare the thrusts with those that T̈ = f + g gives for the same throttles, integrated by CVODES.
+
+    The throttle of an interval is that of its end, as backward Euler has it. Once every interval starts from the file's
+    T and Ṫ, and once the horizon runs through from the first knot.
+    """
+    count = len(robot.jets)
+    if not count:
+        return []
+    step, steps = _integrator(robot), np.diff(trajectory.time)
+    states, throttles = np.vstack([trajectory.thrust, trajectory.thrust_rate]), trajectory.throttle
+    alone, through = np.zeros((count, steps.size)), np.zeros((count, steps.size))
+    state: Array = states[:, 0]
+    for index, dt in enumerate(steps):
+        parameters = np.append(throttles[:, index + 1], dt)
+        state, end = _advance(step, state, parameters), _advance(step, states[:, index], parameters)
+        alone[:, index] = end[:count] - trajectory.thrust[:, index + 1]
+        through[:, index] = state[:count] - trajectory.thrust[:, index + 1]
+    names = robot.jet_names
+    return [
+        worst_of("thrust off CVODES, interval", "N", INTERVAL_LIMIT, np.abs(alone), names, first=1),
+        worst_of("thrust off CVODES, horizon", "N", HORIZON_LIMIT, np.abs(through), names, first=1),
+    ]
+
+
+def _advance(step: cs.Function, state: Array, parameters: Array) -> Array:
+    """Return the state after an interval; infinite where the model runs away, as it may with throttles beyond range."""
+    if not np.isfinite(state).all():
+        return state
+    try:
+        return np.array(step(x0=state, p=parameters)["xf"]).ravel()
+    except RuntimeError:
+        return np.full(state.size, np.inf)
+
+
+def _integrator(robot: Robot) -> cs.Function:
+    """Return the integrator of (T, Ṫ) of all jets over an interval; its parameters are the throttles and Δt [s]."""
+    count = len(robot.jets)
+    thrust, rate, throttle = (cs.SX.sym(name, count) for name in ("thrust", "rate", "throttle"))
+    dt = cs.SX.sym("dt")
+    accelerations = [jet.model.acceleration(thrust[i], rate[i], throttle[i]) for i, jet in enumerate(robot.jets)]
+    problem = {
+        "x": cs.vertcat(thrust, rate),
+        "p": cs.vertcat(throttle, dt),
+        "ode": dt * cs.vertcat(rate, *accelerations),  # over one unit of time
+    }
+    return cs.integrator("thrusts", "cvodes", problem, 0.0, 1.0, {"abstol": _TOLERANCE, "reltol": _TOLERANCE})

@@ -1,0 +1,28 @@
+"""The task as data: what is asked of a motion, its files, and the bundled scenarios."""
+
+from multimodal_to.scenarios.bundled import (
+    SCENARIOS,
+    find,
+    jump,
+    landing,
+    step_up,
+    take_off,
+    take_off_and_landing,
+    walk_to_fly,
+)
+from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Weights
+
+__all__ = [
+    "SCENARIOS",
+    "Scenario",
+    "Start",
+    "Terminal",
+    "Weights",
+    "find",
+    "jump",
+    "landing",
+    "step_up",
+    "take_off",
+    "take_off_and_landing",
+    "walk_to_fly",
+]

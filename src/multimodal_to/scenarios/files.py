@@ -1,0 +1,94 @@
+"""Scenarios as TOML files that a person writes, and changes of single values.
+
+A file holds the fields of a `Scenario` by name, with tables `[weights]` and `[surface]`; with `based_on = "take-off"`
+only what differs from that bundled scenario.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from multimodal_to.errors import MultimodalError, ScenarioError, shortened, shown
+from multimodal_to.files.reading import parse_toml, read_toml
+from multimodal_to.files.writing import write_text
+from multimodal_to.scenarios.bundled import find
+from multimodal_to.scenarios.data import from_dict, to_dict
+from multimodal_to.scenarios.scenario import Scenario
+
+
+def load(path: str | os.PathLike[str]) -> Scenario:
+    """Return the scenario of a TOML file; without a `name`, the file's own is taken.
+
+    Raises:
+        ScenarioError: the file is missing or broken, a key is unknown or missing, or a value is wrong.
+    """
+    source = Path(path)
+    table = read_toml(source, ScenarioError)
+    try:
+        return _scenario(table, source.stem)
+    except MultimodalError as error:
+        raise ScenarioError(f"{source}: {error}") from error
+
+
+def _scenario(table: dict[str, Any], name: str) -> Scenario:
+    table = {"name": name, **table}
+    parent = table.pop("based_on", None)
+    if parent is not None and not isinstance(parent, str):
+        raise ScenarioError(f"'based_on' is {shown(parent)}; expected the name of a bundled scenario")
+    return from_dict(table, find(parent) if parent is not None else None)
+
+
+def to_toml(scenario: Scenario) -> str:
+    """Return a scenario, complete, as the text of a file that `load` reads."""
+    return tomli_w.dumps(to_dict(scenario))
+
+
+def save(scenario: Scenario, path: str | os.PathLike[str]) -> Path:
+    """Write a scenario, complete, as a file that `load` reads; it appears whole or not at all.
+
+    Raises:
+        OutputError: the folder does not exist or cannot be written.
+        ScenarioError: its surface is of a class that no file can name.
+    """
+    return write_text(path, to_toml(scenario))
+
+
+def change(scenario: Scenario, settings: Iterable[str]) -> Scenario:
+    """Return a scenario with values changed by texts such as `final_com_height=0.8` or `weights.thrust=3`.
+
+    A value is written as in TOML; a text needs no quotes.
+
+    Raises:
+        ScenarioError: a text is no `key=value`, names an unknown key, or has a wrong value.
+    """
+    table: dict[str, Any] = {}
+    for setting in settings:
+        key, equals, text = (part.strip() for part in setting.partition("="))
+        if not (key and equals and text):
+            raise ScenarioError(f"'{shortened(setting, 100)}' is no change of a scenario; expected key=value")
+        *parents, last = key.split(".")
+        place = table
+        for parent in parents:
+            place = place.setdefault(parent, {})
+            if not isinstance(place, dict):
+                raise ScenarioError(f"'{shortened(setting, 100)}': another change gives '{parent}' as a whole")
+        place[last] = _value(text)
+    return from_dict(table, scenario)
+
+
+def _value(text: str) -> Any:
+    try:
+        table = parse_toml(f"value = {text}")
+        if len(table) == 1:  # no line break, and another key behind it
+            return table["value"]
+    except ValueError:
+        pass
+    try:
+        return float(text)  # as a person writes it, .5 or 1.
+    except ValueError:
+        return text

@@ -1,0 +1,207 @@
+"""`Trajectory`: every quantity of the problem on one time grid, with names and units, saved without pickle."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from multimodal_to.adam.spatial import Array
+from multimodal_to.errors import TrajectoryError, listed
+from multimodal_to.files.writing import whole
+from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing, text, texts
+
+FORMAT_VERSION = 3
+"""Version 1 lacks `scenario_json`, versions 1 and 2 lack `solve_json`; they are read all the same."""
+
+_NO_ROTATION = 1e-6
+"""A quaternion all of whose parts are smaller cannot be made a unit one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """What one array of a trajectory holds: its rows per body and the count of bodies, unit, and meaning."""
+
+    rows: int
+    of: str  # "robot", "joint", "contact" or "jet": what the rows are repeated for
+    unit: str
+    meaning: str
+
+
+QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
+    {
+        "com_position": Quantity(rows=3, of="robot", unit="m", meaning="x, CoM in the world"),
+        "com_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ẋ"),
+        "com_acceleration": Quantity(rows=3, of="robot", unit="m/s²", meaning="ẍ"),
+        "angular_momentum": Quantity(rows=3, of="robot", unit="kg m²/s", meaning="hω, about the CoM, world axes"),
+        "angular_momentum_rate": Quantity(rows=3, of="robot", unit="N m", meaning="ḣω"),
+        "base_position": Quantity(rows=3, of="robot", unit="m", meaning="p, origin of the base in the world"),
+        "base_quaternion_xyzw": Quantity(rows=4, of="robot", unit="1", meaning="ρ, world-from-base rotation, x y z w"),
+        "base_linear_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ṗ, world axes"),
+        "base_angular_velocity": Quantity(rows=3, of="robot", unit="rad/s", meaning="ω, world axes"),
+        "joint_positions": Quantity(rows=1, of="joint", unit="rad", meaning="s"),
+        "joint_velocities": Quantity(rows=1, of="joint", unit="rad/s", meaning="ṡ"),
+        "contact_positions": Quantity(rows=3, of="contact", unit="m", meaning="p_i, contact points in the world"),
+        "contact_forces": Quantity(rows=3, of="contact", unit="N", meaning="f_i, on the robot, world axes"),
+        "contact_force_rates": Quantity(rows=3, of="contact", unit="N/s", meaning="ḟ_i"),
+        "thrust": Quantity(rows=1, of="jet", unit="N", meaning="T"),
+        "thrust_rate": Quantity(rows=1, of="jet", unit="N/s", meaning="Ṫ"),
+        "thrust_acceleration": Quantity(rows=1, of="jet", unit="N/s²", meaning="T̈"),
+        "throttle": Quantity(rows=1, of="jet", unit="%", meaning="u"),
+    }
+)
+"""The arrays of a `Trajectory` by name; each is (rows × bodies, knots + 1)."""
+
+_LABELS = ("joint_names", "contact_names", "jet_names")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trajectory:
+    """Every quantity of the optimal control problem at every knot.
+
+    Rates at knot k are those that backward Euler applies over the interval that ends at k. All vectors are in world
+    axes; stacked quantities follow the order of `joint_names`, `contact_names` and `jet_names`.
+
+    Raises:
+        TrajectoryError: an array has the wrong shape or is not finite, time does not increase, a name stands twice, or
+            a quaternion is next to zero.
+    """
+
+    robot: str
+    scenario: str
+    time: Array  # [s], (knots + 1,)
+    joint_names: tuple[str, ...]
+    contact_names: tuple[str, ...]
+    jet_names: tuple[str, ...]
+
+    com_position: Array
+    com_velocity: Array
+    com_acceleration: Array
+    angular_momentum: Array
+    angular_momentum_rate: Array
+    base_position: Array
+    base_quaternion_xyzw: Array
+    base_linear_velocity: Array
+    base_angular_velocity: Array
+    joint_positions: Array
+    joint_velocities: Array
+    contact_positions: Array
+    contact_forces: Array
+    contact_force_rates: Array
+    thrust: Array
+    thrust_rate: Array
+    thrust_acceleration: Array
+    throttle: Array
+
+    scenario_json: str = ""  # the complete scenario, as `scenarios.data` writes it; empty where none is known
+    solve_json: str = ""  # how it was solved, as `solving.record` writes it; empty where no solver made it
+
+    def __post_init__(self) -> None:
+        if self.time.ndim != 1 or self.time.size < 2:
+            raise TrajectoryError(f"'time' has shape {self.time.shape}; expected (knots + 1,) with at least two knots")
+        if not (np.isfinite(self.time).all() and (np.diff(self.time) > 0).all()):
+            raise TrajectoryError("'time' must be finite and increase from knot to knot")
+        bodies = {
+            "robot": 1,
+            "joint": len(self.joint_names),
+            "contact": len(self.contact_names),
+            "jet": len(self.jet_names),
+        }
+        for name, quantity in QUANTITIES.items():
+            array, expected = getattr(self, name), (quantity.rows * bodies[quantity.of], self.time.size)
+            if array.shape != expected:
+                raise TrajectoryError(f"'{name}' has shape {array.shape}; expected {expected}")
+            if not np.isfinite(array).all():
+                raise TrajectoryError(f"'{name}' holds values that are not finite")
+        for label in _LABELS:
+            if len(set(names := getattr(self, label))) < len(names):
+                raise TrajectoryError(f"'{label}' are {listed(names)}; expected each name once")
+        if np.abs(self.base_quaternion_xyzw).max(axis=0).min() < _NO_ROTATION:
+            raise TrajectoryError("'base_quaternion_xyzw' holds a quaternion next to zero, which is no rotation")
+
+    @property
+    def knots(self) -> int:
+        """Return the number of intervals N; the arrays have N + 1 columns."""
+        return int(self.time.size - 1)
+
+    @property
+    def duration(self) -> float:
+        """Return the time from the first knot to the last [s]."""
+        return float(self.time[-1] - self.time[0])
+
+    def solve_record(self) -> dict[str, Any]:
+        """Return how the trajectory was solved, by the keys of `solving.record`; empty where that is not known.
+
+        Raises:
+            TrajectoryError: `solve_json` is no JSON object.
+        """
+        try:
+            record = json.loads(self.solve_json or "{}")
+        except (ValueError, RecursionError) as error:
+            raise TrajectoryError(f"the record of the solve of '{self.scenario}' is no JSON: {error}") from error
+        if not isinstance(record, dict):
+            raise TrajectoryError(f"the record of the solve of '{self.scenario}' is no JSON object")
+        return record
+
+    def per_contact(self, name: str) -> Array:
+        """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1)."""
+        rows = QUANTITIES[name].rows
+        return getattr(self, name).reshape(len(self.contact_names), rows, self.time.size)  # type: ignore[no-any-return]
+
+    def vertical_contact_force(self) -> Array:
+        """Return the sum of the world-vertical contact forces [N], (knots + 1,)."""
+        return np.asarray(self.per_contact("contact_forces")[:, 2].sum(axis=0))
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the trajectory as a compressed `.npz` without pickle; the file appears whole or not at all.
+
+        Raises:
+            OutputError: the folder does not exist or cannot be written.
+        """
+        arrays: dict[str, Any] = {
+            "format_version": np.array(FORMAT_VERSION),
+            "robot": np.array(self.robot),
+            "scenario": np.array(self.scenario),
+            "scenario_json": np.array(self.scenario_json),
+            "solve_json": np.array(self.solve_json),
+            "time": self.time,
+            "knots": np.array(self.knots),
+            "total_time": np.array(self.duration),
+            **{name: np.array(getattr(self, name), dtype=np.str_) for name in _LABELS},
+            **{name: getattr(self, name) for name in QUANTITIES},
+        }
+        with whole(path) as draft, draft.open("wb") as stream:
+            np.savez_compressed(stream, allow_pickle=False, **arrays)
+        return Path(path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Trajectory:
+        """Read a trajectory that `save` wrote, of this format version or an older one.
+
+        Raises:
+            TrajectoryError: the file is missing, is no such archive, is larger than `LARGEST_ARCHIVE` or
+                `LARGEST_CONTENT`, or what it holds is no trajectory.
+        """
+        source = Path(path)
+        stored = read_archive(source)
+        version = stored.get("format_version")
+        if version is None or version.shape != () or version.dtype.kind not in "iu":
+            raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it has no format_version")
+        if not 1 <= int(version) <= FORMAT_VERSION:
+            raise TrajectoryError(f"'{source}' has format version {version}; this release reads 1 to {FORMAT_VERSION}")
+        for name in ("scenario_json", "solve_json"):
+            stored.setdefault(name, np.array(""))
+        refuse_missing(stored, ("robot", "scenario", "time", *_LABELS, *QUANTITIES), source)
+        fields: dict[str, Any] = {name: numbers(stored, name, source) for name in ("time", *QUANTITIES)}
+        fields |= {name: texts(stored, name, source) for name in _LABELS}
+        fields |= {name: text(stored, name, source) for name in ("robot", "scenario", "scenario_json", "solve_json")}
+        try:
+            return cls(**fields)
+        except TrajectoryError as error:
+            raise TrajectoryError(f"'{source}': {error}") from error

@@ -1,0 +1,109 @@
+"""Each property of the audit is violated on purpose, and the audit says so, where it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from multimodal_to import scenarios
+from multimodal_to.auditing.audit import audit
+from multimodal_to.errors import InputError
+from multimodal_to.models.contact import FrictionCone
+from multimodal_to.models.terrain import FlatGround, Plane, Stairs
+
+KNOT = 20
+
+
+def spoil(trajectory, name, row, amount, knot=KNOT):
+    array = getattr(trajectory, name).copy()
+    array[row, knot] += amount
+    return replace(trajectory, **{name: array})
+
+
+@pytest.mark.parametrize(
+    ("property_name", "quantity", "row", "amount"),
+    [
+        ("CoM consistency", "com_position", 1, 1e-4),
+        ("momentum consistency", "angular_momentum", 2, 1e-2),
+        ("contact point consistency", "contact_positions", 4, 1e-4),
+        ("quaternion norm", "base_quaternion_xyzw", 3, 1e-4),
+        ("force balance", "contact_forces", 5, 1.0),
+        ("moment balance", "contact_forces", 5, 5.0),
+        ("torque beyond effort", "joint_velocities", 20, 50.0),
+        ("unexplained base force", "contact_forces", 5, 20.0),
+        ("unexplained base moment", "contact_forces", 5, 20.0),
+        ("gap of com_velocity", "com_acceleration", 0, 1e-2),
+        ("gap of joint_positions", "joint_velocities", 7, 1e-2),
+        ("gap of base orientation", "base_angular_velocity", 0, 1e-2),
+        ("gap of thrust", "thrust_rate", 1, 1.0),
+        ("thrust dynamics", "throttle", 1, -1.0),
+        ("pulling normal force", "contact_forces", 2, -500.0),
+        ("friction beyond cone", "contact_forces", 0, 100.0),
+        ("joint range", "joint_positions", 14, 3.0),
+        ("joint speed", "joint_velocities", 3, 10.0),
+        ("thrust range", "thrust", 2, 300.0),
+        ("throttle range", "throttle", 0, 50.0),
+    ],
+)
+def test_a_spoiled_quantity_is_found_where_it_is(ironcub, take_off, property_name, quantity, row, amount):
+    trajectory = take_off.trajectory
+    assert audit(ironcub, trajectory)[property_name].holds
+    finding = audit(ironcub, spoil(trajectory, quantity, row, amount))[property_name]
+    assert not finding.holds
+    assert finding.knot == KNOT
+
+
+@pytest.mark.parametrize("property_name", ["penetration", "normal force × height", "slip under load"])
+def test_a_robot_that_is_moved_under_load_is_found(ironcub, take_off, property_name):
+    row, amount = {"penetration": (2, -0.01), "normal force × height": (2, 0.01), "slip under load": (0, 0.01)}[
+        property_name
+    ]
+    report = audit(ironcub, spoil(take_off.trajectory, "base_position", row, amount))
+    assert not report[property_name].holds
+    assert report[property_name].knot in (KNOT, KNOT + 1)
+    assert not report.holds
+
+
+@pytest.mark.parametrize(
+    ("change", "property_name"),
+    [
+        ({"surface": FlatGround(height=-0.01)}, "normal force × height"),
+        ({"surface": FlatGround(height=0.01)}, "penetration"),
+        ({"surface": Plane(slope=0.4, direction=(-1.0, 0.0))}, "friction beyond cone"),
+        ({"surface": Stairs(edges=(0.0,), heights=(0.0, 0.2), direction=(0.0, 1.0))}, "penetration"),
+        ({"friction": 1e-3}, "friction beyond cone"),
+    ],
+)
+def test_the_ground_and_friction_of_the_scenario_are_the_ones_that_count(ironcub, take_off, change, property_name):
+    scenario = scenarios.take_off()
+    assert audit(ironcub, take_off.trajectory, scenario).holds
+    assert not audit(ironcub, take_off.trajectory, replace(scenario, **change))[property_name].holds
+
+
+def test_a_force_in_a_corner_of_the_pyramid_is_outside_the_second_order_cone(ironcub, take_off):
+    forces = take_off.trajectory.contact_forces.copy()
+    forces[:2, KNOT] = 0.9 * ironcub.friction * forces[2, KNOT]
+    trajectory = replace(take_off.trajectory, contact_forces=forces)
+    scenario = scenarios.take_off()
+    assert audit(ironcub, trajectory, scenario)["friction beyond cone"].holds
+    finding = audit(ironcub, trajectory, replace(scenario, friction_cone=FrictionCone.SECOND_ORDER))[
+        "friction beyond cone"
+    ]
+    assert finding.worst == pytest.approx((0.9 * np.sqrt(2) - 1) * ironcub.friction * forces[2, KNOT])
+    assert (finding.knot, finding.body) == (KNOT, ironcub.contact_names[0])
+
+
+def test_a_trajectory_of_another_robot_is_refused(ironcub, take_off):
+    names = ("other", *take_off.trajectory.joint_names[1:])
+    with pytest.raises(InputError, match="the joints of the trajectory are"):
+        audit(ironcub, replace(take_off.trajectory, joint_names=names))
+
+
+def test_the_figures_describe_the_motion(ironcub, take_off):
+    report = audit(ironcub, take_off.trajectory)
+    assert report.duration == pytest.approx(take_off.trajectory.duration)
+    assert report.airborne >= 0.5
+    assert report.final_thrust_over_weight == pytest.approx(1.0, abs=0.01)
+    assert np.isfinite([finding.worst for finding in report.findings]).all()

@@ -1,0 +1,225 @@
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from adam_robots import example_robots
+from multimodal_to import replay
+from multimodal_to.adam import KinDynComputations
+from multimodal_to.adam.urdf import parse_urdf
+from multimodal_to.errors import MultimodalError
+from multimodal_to.models.robot import JointLimits, Posture, Robot
+from multimodal_to.replay import MeshWarning
+from multimodal_to.replay.dress import read_dress, zero_poses
+from multimodal_to.replay.meshes import Part, find_mesh, package_file, shaded
+from multimodal_to.replay.visuals import FACES, appearance
+from multimodal_to.trajectory import QUANTITIES, Trajectory
+from multimodal_to.trajectory.derived import frame_poses
+
+IRONCUB = Path(__file__).parents[2] / "robots" / "ironcub"
+VISUAL = '<visual><geometry><mesh filename="{}" scale="{}"/></geometry></visual>'
+needs_icub = pytest.mark.skipif(
+    package_file("icub-models", "iCubGazeboV2_5/model.urdf") is None, reason="icub-models is not installed"
+)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A package `boxes` with a URDF in a folder beside its meshes, and a mesh that is none of its business."""
+    package = tmp_path / "share" / "boxes"
+    for inside in ("urdf", "meshes"):
+        (package / inside).mkdir(parents=True)
+    (package / "package.xml").write_text("<package/>")
+    box = trimesh.creation.box((0.1, 0.2, 0.3))
+    box.export(package / "meshes" / "box.stl")
+    box.export(tmp_path / "secret.stl")
+    (package / "meshes" / "pointer.stl").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\n")
+    (package / "meshes" / "broken.stl").write_bytes(b"no mesh at all")
+    return package
+
+
+def urdf(folder: Path, *addresses: str, scale: str = "1 1 1") -> Path:
+    path = folder / "urdf" / "robot.urdf"
+    visuals = "".join(VISUAL.format(address, scale) for address in addresses)
+    path.write_text(f'<robot name="r"><link name="base">{visuals}</link></robot>')
+    return path
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "package://boxes/meshes/box.stl",
+        "model://boxes/meshes/box.stl",
+        "../meshes/box.stl",
+        "package://boxes/urdf/../meshes/box.stl",
+    ],
+)
+def test_a_mesh_is_found_however_a_urdf_names_it(folder, address):
+    assert find_mesh(address, urdf(folder)) == folder / "meshes" / "box.stl"
+    assert find_mesh((folder / "meshes" / "box.stl").as_uri(), urdf(folder)) == folder / "meshes" / "box.stl"
+
+
+def test_a_package_elsewhere_is_found_through_the_environment(folder, tmp_path, monkeypatch):
+    other = tmp_path / "elsewhere" / "robot.urdf"
+    other.parent.mkdir()
+    with pytest.raises(MultimodalError, match="not found"):
+        find_mesh("package://boxes/meshes/none.stl", other)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(folder.parent))
+    assert find_mesh("package://boxes/meshes/box.stl", other) == folder / "meshes" / "box.stl"
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "package://boxes/../../secret.stl",
+        "model://boxes/meshes/../../../secret.stl",
+        "../../../secret.stl",
+        "package://../secret.stl",
+        "file:///etc/hostname",
+        "package://boxes/%2e%2e/%2e%2e/secret.stl",
+    ],
+)
+def test_no_path_leaves_its_root(folder, address):
+    with pytest.raises(MultimodalError, match=r"leaves the folder of its robot|not found"):
+        find_mesh(address, urdf(folder))
+
+
+def test_one_warning_names_all_meshes_that_cannot_be_drawn_and_why(folder):
+    names = ["gone.stl", "../../../secret.stl", "../meshes/pointer.stl", "../meshes/broken.stl", "../meshes/box.stl"]
+    with pytest.warns(MeshWarning) as caught:
+        found = appearance(urdf(folder, *names)).visuals
+    assert [visual.name for visual in found] == ["visual_4"]
+    (warning,) = caught
+    text = str(warning.message)
+    assert text.startswith("4 meshes are not drawn: 'gone.stl': not found; '../../../secret.stl': leaves the folder")
+    assert "'../meshes/pointer.stl': a git-LFS pointer" in text
+    assert text.endswith("and 1 more")
+
+
+def test_a_mesh_is_scaled_and_its_colour_is_the_urdfs(folder):
+    path = urdf(folder, "../meshes/box.stl", scale="2 1 1")
+    path.write_text(
+        path.read_text().replace("</visual>", '<material name="m"><color rgba="1 0 0 0.5"/></material></visual>')
+    )
+    (visual,) = appearance(path).visuals
+    np.testing.assert_allclose(np.ptp(visual.part.vertices, axis=0), [0.2, 0.2, 0.3], atol=1e-7)
+    assert visual.rgba == (1.0, 0.0, 0.0, 0.5)
+
+
+def test_sharp_edges_stay_sharp_and_round_ones_round():
+    box, ball = trimesh.creation.box(), trimesh.creation.icosphere(subdivisions=3)
+    corners, _, normals = shaded(Part(vertices=box.vertices, faces=box.faces, rgba=None))
+    assert len(corners) == 24
+    np.testing.assert_allclose(np.abs(normals).max(axis=1), 1.0, atol=1e-9)
+    points, _, normals = shaded(Part(vertices=ball.vertices, faces=ball.faces, rgba=None))
+    assert len(points) == len(ball.vertices)
+    np.testing.assert_allclose(normals, points, atol=0.02)
+
+
+@needs_icub
+def test_the_icubs_legs_hips_and_torso_coincide_with_the_ironcubs():
+    dress = read_dress(IRONCUB)
+    ours, theirs = (zero_poses(parse_urdf(path), "root_link") for path in (IRONCUB / "ironcub.urdf", dress.urdf))
+    lower = [name for name in ours if name in theirs and any(part in name for part in ("hip", "leg", "ankle", "torso"))]
+    assert len(lower) == 14
+    for name in lower:
+        np.testing.assert_allclose(ours[name], theirs[name], atol=1e-4)
+
+
+@needs_icub
+def test_each_mesh_meets_the_link_that_the_table_names():
+    dress = read_dress(IRONCUB)
+    ours, other = parse_urdf(IRONCUB / "ironcub.urdf"), parse_urdf(dress.urdf)
+    mine, theirs = zero_poses(ours, "root_link"), zero_poses(other, "root_link")
+    for garment, placement in zip(dress.garments, dress.placements(ours, other), strict=True):
+        mesh = mine[garment.link] @ placement  # root_H_mesh
+        np.testing.assert_allclose(mesh[:3, :3], theirs[garment.source][:3, :3], atol=1e-9)
+        anchor = mesh @ np.linalg.inv(theirs[garment.source]) @ theirs[garment.at]
+        np.testing.assert_allclose(anchor[:3, 3], mine[garment.at][:3, 3], atol=1e-9)
+
+
+@needs_icub
+def test_the_dressed_ironcub_keeps_its_jetpack_and_turbines_and_stands_on_its_soles(ironcub):
+    look = appearance(ironcub.urdf)
+    names = {(visual.link, visual.part is None) for visual in look.visuals}
+    assert ("chest", True) in names
+    assert ("chest", False) in names
+    assert ("l_ankle_2", True) not in names
+    assert sum(visual.link.endswith("turbine") for visual in look.visuals) == 36
+    assert sum(len(visual.part.faces) for visual in look.visuals if visual.part is not None) <= 1.01 * FACES
+    assert "CC BY-SA 4.0" in look.attribution
+    soles = [visual for visual in look.visuals if visual.name.endswith("_foot_mesh_0")]
+    home = at_home(ironcub)
+    for visual in soles:
+        pose = frame_poses(ironcub, home, visual.link)[0] @ visual.transform
+        lowest = (visual.part.vertices @ pose[2, :3] + pose[2, 3]).min()
+        points = home.contact_positions[2::3, 0]
+        assert abs(lowest - points.min()) < 0.005
+
+
+def test_without_the_package_primitives_serve(ironcub, monkeypatch):
+    monkeypatch.setattr("multimodal_to.replay.dress.package_file", lambda package, ending: None)
+    look = appearance(ironcub.urdf)
+    assert look.attribution == ""
+    assert all(visual.part is None for visual in look.visuals)
+    assert len(look.visuals) > 90
+
+
+def at_home(robot: Robot) -> Trajectory:
+    """A trajectory in which the robot stands at home."""
+    counts = {"robot": 1, "joint": len(robot.joint_names), "contact": len(robot.contacts), "jet": len(robot.jets)}
+    arrays = {name: np.zeros((quantity.rows * counts[quantity.of], 2)) for name, quantity in QUANTITIES.items()}
+    arrays["base_position"] += robot.home.base_position[:, None]
+    arrays["base_quaternion_xyzw"] += robot.home.base_quaternion_xyzw[:, None]
+    arrays["joint_positions"] += robot.home.joint_positions[:, None]
+    bare = Trajectory(
+        robot=robot.name,
+        scenario="home",
+        time=np.array([0.0, 1.0]),
+        joint_names=robot.joint_names,
+        contact_names=robot.contact_names,
+        jet_names=robot.jet_names,
+        **arrays,
+    )
+    points = [frame_poses(robot, bare, name)[:, :3, 3].T for name in robot.contact_names]
+    return replace(
+        bare, contact_positions=np.concatenate([np.zeros((0, 2)), *points]), com_position=arrays["base_position"]
+    )
+
+
+@pytest.mark.parametrize("name", ["talos_data/robots/talos_reduced.urdf", "solo_description/robots/solo12.urdf"])
+def test_a_robot_of_example_robot_data_replays_with_its_meshes(name, tmp_path):
+    path = example_robots() / name
+    kindyn = KinDynComputations(path)
+    count = len(kindyn.joint_names)
+    robot = Robot(
+        name=path.stem,
+        urdf=path,
+        kindyn=kindyn,
+        joint_groups={},
+        contacts=(),
+        friction=0.7,
+        jets=(),
+        joint_limits=JointLimits(
+            lower=np.full(count, -3.0),
+            upper=np.full(count, 3.0),
+            speed=np.full(count, 9.0),
+            effort=np.full(count, 50.0),
+        ),
+        home=Posture(
+            base_position=np.array([0, 0, 1.0]),
+            base_quaternion_xyzw=np.array([0, 0, 0, 1.0]),
+            joint_positions=np.zeros(count),
+        ),
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", MeshWarning)
+        look = appearance(path)
+        page = replay.write_html(robot, at_home(robot), tmp_path / "robot.html")
+    assert sum(visual.part is not None for visual in look.visuals) > 10
+    assert page.stat().st_size < 15e6

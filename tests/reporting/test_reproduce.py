@@ -1,0 +1,119 @@
+"""Runs beside the paper's figures; the scenario that the command solves here is a short take-off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import multimodal_to as mt
+from multimodal_to.cli import app, solving
+from multimodal_to.errors import TrajectoryError
+from multimodal_to.reporting.comparison import AUDITS, SOLVES, markdown, table
+from multimodal_to.reporting.published import PUBLISHED
+from multimodal_to.reporting.reproduce import Run, read_published
+from multimodal_to.trajectory import QUANTITIES
+from multimodal_to.trajectory.importing import COMPUTED
+from synthetic import take_off as synthetic_take_off
+
+
+@pytest.fixture(scope="module")
+def run(ironcub, take_off) -> Run:
+    report = mt.audit(ironcub, take_off.trajectory)
+    return Run(
+        name="take-off",
+        robot=ironcub,
+        trajectory=take_off.trajectory,
+        report=report,
+        steps=0,
+        solution=take_off,
+        whole_time=99.0,
+    )
+
+
+@pytest.fixture(scope="module")
+def bare(ironcub, tmp_path_factory):
+    """A folder with the arrays of a motion, as the paper's data can be had."""
+    trajectory, folder = synthetic_take_off(ironcub), tmp_path_factory.mktemp("published")
+    arrays = {name: getattr(trajectory, name) for name in QUANTITIES if name not in COMPUTED}
+    np.savez(folder / "take_off.npz", total_time=trajectory.duration, **arrays)
+    return folder
+
+
+def cells(results, label):
+    return next(dict(zip(results.titles, row, strict=True)) for row in results.rows if row[0] == label)
+
+
+def test_the_papers_figures_stand_below_the_run_of_their_scenario(run):
+    results = table([run], SOLVES)
+    assert [row[0] for row in results.rows] == ["take-off", "take-off, paper"]
+    ours, paper = cells(results, "take-off"), cells(results, "take-off, paper")
+    assert (ours["status"], ours["iterations"], ours["in all [s]"]) == ("optimal", str(run.solution.iterations), "99")
+    assert (ours["steps"], ours["thrust / weight"]) == ("0", "1.00")
+    assert (paper["status"], paper["iterations"], paper["in the solver [s]"]) == ("acceptable", "2976", "689")
+    assert (paper["steps"], paper["in all [s]"]) == ("–", "–")
+
+
+def test_the_verdict_is_the_audits_and_names_the_allowances_it_used(ironcub, run):
+    held = cells(table([run], AUDITS), "take-off")
+    assert held["verdict"] == f"all {len(run.report.findings)} hold"
+    pushed = replace(run.trajectory, thrust=run.trajectory.thrust * 1.001)
+    scenario = mt.scenarios.take_off()
+    failed = mt.audit(ironcub, pushed, scenario)
+    assert failed.allowances_used == ()
+    verdict = cells(table([replace(run, report=failed)], AUDITS), "take-off")["verdict"]
+    broken = [finding.name for finding in failed.findings if not finding.holds]
+    assert verdict == f"{len(broken)} of {len(failed.findings)} fail"
+    allowed = mt.audit(ironcub, pushed, replace(scenario, allowances=dict.fromkeys(broken, 1e3) | {"penetration": 1.0}))
+    verdict = cells(table([replace(run, report=allowed)], AUDITS), "take-off")["verdict"]
+    assert allowed.holds
+    assert allowed.allowances_used == tuple(broken)  # not the one that was not needed
+    assert verdict.startswith(f"all {len(failed.findings)} hold, allowed {broken[0]} 1000 ")
+
+
+def test_published_files_are_audited_as_rows_of_the_same_tables(ironcub, run, bare):
+    (published,) = read_published(ironcub, bare)
+    assert not published.holds
+    results = table([run, published], AUDITS)
+    assert [row[0] for row in results.rows] == ["take-off", "take-off, paper", "take-off, published file"]
+    assert "fail" in cells(results, "take-off, published file")["verdict"]
+    assert table([published], AUDITS).rows[0][0] == "take-off, published file"
+
+
+def test_a_folder_without_published_files_is_refused(ironcub, tmp_path):
+    with pytest.raises(TrajectoryError, match=r"no \.npz"):
+        read_published(ironcub, tmp_path)
+
+
+def test_every_published_figure_is_of_a_bundled_scenario():
+    assert {published.scenario for published in PUBLISHED} <= set(mt.scenarios.SCENARIOS)
+
+
+def test_a_row_of_which_nothing_is_known_is_left_out(run):
+    jump = replace(run, name="jump")  # of the paper's jump only the solver's figures are known
+    assert [row[0] for row in table([jump], SOLVES).rows] == ["jump", "jump, paper"]
+    assert [row[0] for row in table([jump], AUDITS).rows] == ["jump"]
+
+
+def test_the_markdown_has_rows_of_equal_length(run):
+    lines = [line for line in markdown([run]).splitlines() if line.startswith("|")]
+    assert len(lines) == 2 * (2 + 2)
+    assert {line.count("|") for line in lines} == {len(SOLVES) + 2}
+    assert len(SOLVES) == len(AUDITS)
+
+
+def test_the_command_solves_writes_and_leaves_with_zero_when_all_holds(tmp_path, monkeypatch, bare):
+    short = replace(mt.scenarios.take_off(), knots=35, interval_min=0.2, interval_max=0.2)
+    monkeypatch.setattr(solving, "find", {"take-off": short}.__getitem__)
+    arguments = ["reproduce", "take-off", "--output", str(tmp_path), "--published", str(bare)]
+    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
+    assert result.exit_code == 0, result.output
+    assert {"trajectory.npz", "report.html", "forces.png"} <= {path.name for path in tmp_path.glob("take-off/*")}
+    written = (tmp_path / "table.md").read_text(encoding="utf-8")
+    assert "| take-off | optimal |" in written
+    assert "| take-off, paper | acceptable | 2976 | 689 |" in written
+    assert "| take-off, published file | – |" in written
+    assert f"wrote {tmp_path / 'table.md'}" in result.output.replace("\n", "")
+    assert mt.audit(mt.load_robot("ironcub"), mt.Trajectory.load(tmp_path / "take-off" / "trajectory.npz")).holds

@@ -1,0 +1,213 @@
+"""MuJoCo as a second opinion."""
+
+from __future__ import annotations
+
+import builtins
+import sys
+
+import numpy as np
+import pytest
+
+from multimodal_to.adam.urdf import read_urdf
+from multimodal_to.errors import InputError, OutputError, TrajectoryError
+from multimodal_to.models.terrain import FlatGround, Plane, Stairs, frame_function
+from multimodal_to.simulation import (
+    build_model,
+    disagreement,
+    play,
+    random_states,
+    simulated_trajectory,
+    stabiliser,
+    states_along,
+    tracking,
+)
+from multimodal_to.simulation.model import POINT_RADIUS
+from multimodal_to.simulation.reference import reference
+from multimodal_to.simulation.stabiliser import _ridge, _unborne, rotation_vector
+from multimodal_to.trajectory.resampling import resample
+from synthetic import take_off as synthetic_take_off
+
+mujoco = pytest.importorskip("mujoco")
+
+
+@pytest.fixture(scope="module")
+def playback(ironcub, take_off):
+    return play(ironcub, take_off.trajectory)
+
+
+def test_inverse_dynamics_agrees_with_rnea_at_random_states(ironcub):
+    assert disagreement(ironcub, random_states(ironcub, 100)) < 1e-10
+
+
+def test_inverse_dynamics_agrees_with_rnea_along_a_motion(ironcub):
+    assert disagreement(ironcub, states_along(synthetic_take_off(ironcub))) < 1e-10
+
+
+def test_every_link_has_the_mass_and_inertia_of_the_urdf(ironcub):
+    model = build_model(ironcub, FlatGround()).model
+    links, _ = read_urdf(ironcub.urdf)
+    assert model.body_mass.sum() == pytest.approx(ironcub.mass, rel=1e-14)
+    for link in links:
+        body = model.body(link.name)
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, body.iquat)
+        inertia = turn.reshape(3, 3) @ np.diag(body.inertia) @ turn.reshape(3, 3).T
+        assert body.mass[0] == link.mass
+        np.testing.assert_allclose(body.ipos, link.com, atol=1e-15)
+        np.testing.assert_allclose(inertia, link.inertia, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [FlatGround(height=0.1), Plane(slope=0.2, direction=(1.0, 1.0)), Stairs(edges=(0.3,), heights=(0.0, 0.1))],
+)
+def test_a_contact_point_touches_where_its_distance_is_zero(ironcub, surface):
+    simulation = build_model(ironcub, surface)
+    data = mujoco.MjData(simulation.model)
+    ground = simulation.model.geom("ground").id
+    mujoco.mj_kinematics(simulation.model, data)
+    down = np.array([0.0, 0.0, -1.0])
+    for x, y in ((0.01, 0.02), (0.8, -0.4)):
+        start = np.array([x, y, 2.0])
+        depth = simulation_ray(simulation.model, data, ground, start, down)
+        distance, normal, _ = (np.array(part).ravel() for part in frame_function(surface)([x, y, 2.0 - depth]))
+        assert distance[0] == pytest.approx(-POINT_RADIUS, abs=2e-4)
+        assert normal[2] > 0.9
+
+
+def simulation_ray(model, data, geom, start, direction):
+    if model.geom(geom).type[0] == mujoco.mjtGeom.mjGEOM_HFIELD:
+        return mujoco.mj_rayHfield(model, data, geom, start, direction)
+    return mujoco.mju_rayGeom(
+        data.geom_xpos[geom],
+        data.geom_xmat[geom],
+        model.geom_size[geom],
+        start,
+        direction,
+        mujoco.mjtGeom.mjGEOM_PLANE,
+    )
+
+
+def test_the_take_off_survives_the_simulator(playback):
+    errors = tracking(playback)
+    assert errors.com < 0.04
+    assert errors.attitude < 4.0
+    assert errors.end == "hovers"
+    assert playback.fell is None
+    assert all(abs(switch.simulated - switch.planned) < 0.3 for switch in errors.switches)
+
+
+def test_turbines_obey_their_own_dynamics_and_range(ironcub, playback):
+    time = playback.time
+    for index, jet in enumerate(ironcub.jets):
+        throttle = playback.throttle[:, index]
+        assert jet.throttle_min <= throttle.min() <= throttle.max() <= jet.throttle_max
+        rate = np.diff(playback.thrust_rate[:, index]) / np.diff(time)
+        own = [
+            float(jet.model.acceleration(*state))
+            for state in zip(
+                playback.thrust[:-1:50, index], playback.thrust_rate[:-1:50, index], throttle[:-1:50], strict=True
+            )
+        ]
+        np.testing.assert_allclose(rate[::50], own, atol=1e-6)
+
+
+def test_what_happened_is_a_trajectory_on_the_grid_of_the_plan(playback, tmp_path):
+    motion = simulated_trajectory(playback)
+    plan = playback.plan
+    np.testing.assert_array_equal(motion.time, plan.time)
+    assert np.linalg.norm(motion.com_position - plan.com_position, axis=0).max() < 0.04
+    assert motion.scenario == "take-off in MuJoCo"
+    assert motion.scenario_json == plan.scenario_json
+    weight = motion.vertical_contact_force()[1:6].mean()
+    assert weight == pytest.approx(plan.vertical_contact_force()[1:6].mean(), rel=0.05)
+    motion.save(tmp_path / "simulated.npz")
+
+
+def test_without_a_balance_feedback_the_take_off_tips_and_lies_still(ironcub, take_off):
+    playback = play(ironcub, take_off.trajectory, stabilise=False)
+    assert tracking(playback).end == "fell"
+    assert playback.fell < take_off.trajectory.duration
+    after = playback.qpos[playback.time >= playback.fell]
+    assert len(after) > 1
+    assert (after == after[0]).all()
+
+
+def test_a_wide_stance_bears_roll_and_a_line_of_heels_leaves_pitch_to_the_jets():
+    arms = np.array([[0.0, 0.15, 0.0], [0.0, -0.15, 0.0]])
+    left = _unborne(arms, np.array([0.5, 0.5]))
+    width, radius = 0.15**2, stabiliser.RADIUS**2
+    np.testing.assert_allclose(left, np.diag([radius / (width + radius), 1.0, radius / (width + radius)]), atol=1e-12)
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(_unborne(arms @ turned.T, np.array([0.5, 0.5])), turned @ left @ turned.T, atol=1e-12)
+
+
+def test_contact_forces_are_those_that_carry_the_robot(ironcub, playback):
+    standing = (playback.time > 0.2) & (playback.time < 1.0)
+    vertical = playback.contact_forces[standing, :, 2].sum(axis=1).mean()
+    up = -ironcub.mass * ironcub.gravity[2]
+    thrust = playback.thrust[standing].sum(axis=1).mean()
+    assert up - thrust < vertical < up
+    assert (playback.contact_forces[:, :, 2] >= 0.0).all()
+
+
+def test_a_short_stand_stays_where_it_is(ironcub, take_off):
+    plan = take_off.trajectory
+    short = resample(plan, np.linspace(plan.time[0], plan.time[0] + 0.5, 11))
+    errors = tracking(play(ironcub, short))
+    assert errors.com < 0.01
+    assert errors.fell is None
+
+
+def test_a_plan_for_other_jets_is_refused(ironcub):
+    with pytest.raises(TrajectoryError, match="not those of the robot"):
+        play(ironcub.with_jets(()), synthetic_take_off(ironcub))
+
+
+def test_least_squares_with_wide_spreads_solve_exactly():
+    matrix = np.random.default_rng(0).normal(size=(6, 9))
+    target = np.arange(6.0)
+    np.testing.assert_allclose(matrix @ _ridge(matrix, target, np.full(9, 1e4), np.ones(6)), target, atol=1e-5)
+
+
+def test_a_rotation_vector_is_the_logarithm():
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(rotation_vector(turn), [0.0, 0.0, np.pi / 2], atol=1e-12)
+
+
+def test_a_missing_package_is_named_with_what_to_install(ironcub, monkeypatch):
+    real = builtins.__import__
+
+    def without(name, *rest):
+        if name == "mujoco":
+            raise ImportError(name)
+        return real(name, *rest)
+
+    monkeypatch.delitem(sys.modules, "mujoco", raising=False)
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(OutputError, match=r"multimodal-to\[sim\]"):
+        build_model(ironcub)
+
+
+def test_a_scenario_with_less_friction_reaches_the_simulator(ironcub):
+    model = build_model(ironcub, FlatGround(), 0.1).model
+    assert model.geom("ground").friction[0] == 0.1
+    assert model.geom(ironcub.contact_names[0]).friction[0] == 0.1
+
+
+def test_with_a_delay_the_motion_follows_its_forces(ironcub):
+    plan = synthetic_take_off(ironcub)
+    interval = plan.duration / plan.knots
+    times = np.linspace(0.0, plan.duration, 41)
+    own, late = reference(ironcub, plan, times), reference(ironcub, plan, times + interval, delay=1.0)
+    for name in ("com", "com_velocity", "rotation", "joints", "joint_velocities", "angular_momentum"):
+        np.testing.assert_allclose(getattr(late, name)[:-1], getattr(own, name)[:-1], atol=1e-9)
+    at_once = reference(ironcub, plan, times, delay=1.0)
+    for name in ("contact_forces", "thrust", "torques", "throttle"):
+        np.testing.assert_array_equal(getattr(at_once, name), getattr(own, name))
+    assert np.abs(own.com - at_once.com).max() > 0.01
+
+
+def test_a_delay_is_at_most_an_interval(ironcub):
+    with pytest.raises(InputError, match=r"the delay is 1\.5 intervals; expected 0 to 1"):
+        play(ironcub, synthetic_take_off(ironcub), delay=1.5)
