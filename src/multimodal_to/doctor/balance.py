@@ -14,7 +14,7 @@ from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Posture
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.guess import base_transform, contact_positions
-from multimodal_to.ocp.variables import Knot
+from multimodal_to.ocp.knot import Knot
 
 LEVER = 0.3
 """What a residual moment is divided by to weigh it against a residual force [m]."""
@@ -56,12 +56,13 @@ def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, lever:
         thrusts: the greatest thrust of each jet [N], (jets,).
         lever: what moments are divided by [m]; with an infinite one forces act wherever they are wanted.
     """
-    robot, world = task.robot, replace(task.world, friction_cone=FrictionCone.PYRAMID)
+    robot, scenario = task.robot, replace(task.scenario, friction_cone=FrictionCone.PYRAMID)
+    parameters = replace(task.parameters, scenario=scenario)
     forces = cs.SX.sym("f", 3 * len(robot.contacts))
     thrust = cs.SX.sym("T", len(robot.jets))
     knot = knot_of(task, posture, forces, thrust)
-    balance = constraints.static_equilibrium(knot, world).expression
-    cone = constraints.friction_cone(knot, world).expression
+    balance = constraints.static_equilibrium(knot, parameters)
+    cone = constraints.friction_cone(knot, parameters)
     free = cs.vertcat(forces, thrust)
     rows = cs.Function("rows", [free], [cs.vertcat(balance, cone), cs.jacobian(cs.vertcat(balance, cone), free)])
     offset, matrix = (np.array(part) for part in rows(np.zeros(free.shape[0])))

@@ -10,8 +10,8 @@ import numpy as np
 from multimodal_to.doctor.balance import knot_of
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.task import Task
-from multimodal_to.ocp import constraints
-from multimodal_to.ocp.constraints import KnotRows
+from multimodal_to.ocp import paper
+from multimodal_to.ocp.terms import Constraint
 from multimodal_to.ocp.variables import CONTACT_REACH, JET_REACH
 
 _TOLERANCE = 1e-6  # [1]
@@ -20,16 +20,21 @@ _TOLERANCE = 1e-6  # [1]
 def reach(task: Task) -> Iterator[Symptom]:
     """Hold contact points and jets, in the posture that the problem is built around, to their reach from the CoM."""
     robot = task.robot
-    yield from _beyond(task, constraints.contact_reach, robot.contact_names, CONTACT_REACH, "CONTACT_REACH")
-    yield from _beyond(task, constraints.jet_reach, robot.jet_names, JET_REACH, "JET_REACH")
+    for term, names, limits, constant in (
+        (paper.CONTACT_REACH, robot.contact_names, CONTACT_REACH, "CONTACT_REACH"),
+        (paper.JET_REACH, robot.jet_names, JET_REACH, "JET_REACH"),
+    ):
+        if task.held(term):
+            yield from _beyond(task, term, names, limits, constant)
 
 
 def _beyond(
-    task: Task, rows: KnotRows, names: tuple[str, ...], limits: tuple[float, ...], constant: str
+    task: Task, term: Constraint, names: tuple[str, ...], limits: tuple[float, ...], constant: str
 ) -> Iterator[Symptom]:
     robot = task.robot
     knot = knot_of(task, task.posture, cs.SX.zeros(3 * len(robot.contacts)), cs.SX.zeros(len(robot.jets)))
-    arms = np.abs(np.array(cs.evalf(rows(knot, task.world).expression))).reshape(-1, 3)  # as fractions of the reach
+
+    arms = np.abs(np.array(cs.evalf(term.rows(knot, task.parameters).expression))).reshape(-1, 3)
     if arms.max(initial=0.0) <= 1 + _TOLERANCE:
         return
     point, axis = np.unravel_index(int(arms.argmax()), arms.shape)
