@@ -87,9 +87,12 @@ def show(
 
     Example: multimodal-to show take-off > my_task.toml
     """
-    scenario = stored(Trajectory.load(name)) if name.endswith(".npz") else chosen(name, None)
+    trajectory = Trajectory.load(name) if name.endswith(".npz") else None
+    scenario = chosen(name, None) if trajectory is None else stored(trajectory)
     if scenario is None:
         raise ScenarioError(f"'{name}' keeps no scenario")
+    if trajectory is not None and (unusual := trajectory.unusual_formulation()):
+        out.print(f"# the problem had {unusual}; a scenario does not hold these", soft_wrap=True)
     out.print(to_toml(change(scenario, settings or ())), soft_wrap=True, end="")
 
 

@@ -9,6 +9,7 @@ from typing import Protocol
 from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import SX
 from multimodal_to.ocp.knot import Knot
+from multimodal_to.trajectory.trajectory import PAPER_RULE
 
 
 class IntegrationRule(Protocol):
@@ -34,7 +35,7 @@ class IntegrationRule(Protocol):
 class BackwardEuler:
     """φ is the rate at the interval's end: y⁺ = y + ẏ⁺ Δt. It is the paper's rule, of order one."""
 
-    name: str = "backward Euler"
+    name: str = PAPER_RULE
 
     def over(self, quantity: Callable[[Knot], SX], start: Knot, end: Knot) -> SX:
         """Return the quantity at the interval's end."""
