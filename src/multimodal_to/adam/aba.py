@@ -32,11 +32,11 @@ def forward_dynamics(
 
     Args:
         tree: the robot.
-        base: pose of the base in the world.
-        s: joint positions.
-        base_twist: (ṗ, ω) of the base in world axes.
-        s_dot: joint velocities.
-        torques: of the joints [N m or N].
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+        base_twist: (ṗ, ω) of the base in world axes, (6, 1) [m/s, rad/s].
+        s_dot: joint velocities, (n, 1) [rad/s or m/s].
+        torques: of the joints, (n, 1) [N m or N].
         gravity: acceleration of free fall in world axes [m/s²], (3, 1).
         wrenches: by frame name, the (force, moment) that the world applies there, at the frame's origin, world axes.
     """

@@ -33,7 +33,13 @@ class FloatingBase:
 
     @classmethod
     def at(cls, base_transform: SX, tree: Tree, representation: Representations) -> FloatingBase:
-        """Return the base at `base_transform`, w_H_base, (4, 4)."""
+        """Return the base at `base_transform`, w_H_base, (4, 4).
+
+        Args:
+            base_transform: w_H_base, (4, 4) [1, m].
+            tree: the robot.
+            representation: how v_b is written.
+        """
         if representation is Representations.BODY_FIXED_REPRESENTATION:
             return cls(tree, representation, as_pose(cs.SX.eye(4)), base_transform[:3, :3])
         return cls(tree, representation, as_pose(base_transform), cs.SX.eye(3))
@@ -51,14 +57,27 @@ class FloatingBase:
         return to_mixed_rate(self.representation, self.pose, self.twist(v_b))
 
     def chain(self, frame: str, s: SX, v_b: SX, s_dot: SX) -> tuple[Chain, list[Motion]]:
-        """Return the chain to a frame and how it moves while ν̇ = 0."""
+        """Return the chain to a frame and how it moves while ν̇ = 0.
+
+        Args:
+            frame: name of the frame.
+            s: joint positions, (n, 1) [rad or m].
+            v_b: velocity of the base, as represented, (6, 1) [m/s, rad/s].
+            s_dot: joint velocities, (n, 1) [rad/s or m/s].
+        """
         twist, acceleration = self.twist(v_b), self.rate(v_b) @ v_b
         chain = Chain.to(self.tree, self.tree.frame(frame), self.pose, s)
         motion = Motion(twist[:3], twist[3:], acceleration[:3], acceleration[3:])
         return chain, kinematics.chain_motions(chain, motion, s_dot)
 
     def momentum(self, s: SX, v_b: SX, s_dot: SX) -> SX:
-        """Return h = (m ẋ, hω), (6, 1), about the CoM."""
+        """Return h = (m ẋ, hω), (6, 1), about the CoM.
+
+        Args:
+            s: joint positions, (n, 1) [rad or m].
+            v_b: velocity of the base, as represented, (6, 1) [m/s, rad/s].
+            s_dot: joint velocities, (n, 1) [rad/s or m/s].
+        """
         momentum = centroidal.centroidal_momentum(self.tree, self.pose, s, self.twist(v_b), s_dot)
         return cs.vertcat(momentum.linear, momentum.angular)
 

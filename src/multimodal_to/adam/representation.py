@@ -63,7 +63,13 @@ def from_mixed(representation: Representations, pose: Pose) -> SX:
 
 
 def to_mixed_rate(representation: Representations, pose: Pose, twist: SX) -> SX:
-    """Return Ẋ, (6, 6), of a frame at `pose` that moves with `twist` = (ṗ, ω)."""
+    """Return Ẋ, (6, 6), of a frame at `pose` that moves with `twist` = (ṗ, ω).
+
+    Args:
+        representation: how the frame's velocity is written.
+        pose: of the frame in the world.
+        twist: (ṗ, ω) of the frame in world axes, (6, 1) [m/s, rad/s].
+    """
     if representation is Representations.BODY_FIXED_REPRESENTATION:
         turning = cs.skew(twist[3:]) @ pose.rotation
         return cs.diagcat(turning, turning)
