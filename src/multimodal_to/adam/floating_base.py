@@ -62,7 +62,7 @@ class FloatingBase:
         Args:
             frame: name of the frame.
             s: joint positions, (n, 1) [rad or m].
-            v_b: velocity of the base, as represented, (6, 1) [m/s, rad/s].
+            v_b: velocity of the base in the representation, (6, 1) [m/s, rad/s].
             s_dot: joint velocities, (n, 1) [rad/s or m/s].
         """
         twist, acceleration = self.twist(v_b), self.rate(v_b) @ v_b
@@ -75,7 +75,7 @@ class FloatingBase:
 
         Args:
             s: joint positions, (n, 1) [rad or m].
-            v_b: velocity of the base, as represented, (6, 1) [m/s, rad/s].
+            v_b: velocity of the base in the representation, (6, 1) [m/s, rad/s].
             s_dot: joint velocities, (n, 1) [rad/s or m/s].
         """
         momentum = centroidal.centroidal_momentum(self.tree, self.pose, s, self.twist(v_b), s_dot)
@@ -101,7 +101,7 @@ class FloatingBase:
             v_b_dot: derivative of the six numbers v_b, (6, 1) [m/s², rad/s²].
             s_ddot: joint accelerations, (n, 1) [rad/s² or m/s²].
             gravity: acceleration of free fall in world axes, (3, 1) [m/s²].
-            wrenches: by frame, the (force, moment) that the world applies, (6, 1) [N, N m], as represented.
+            wrenches: by frame, the (force, moment) that the world applies, (6, 1) [N, N m], in the representation.
         """
         v_b, v_b_dot = (cs.SX(6, 1) if value is None else value for value in (v_b, v_b_dot))
         s_dot, s_ddot = (cs.SX(len(self.tree.joints), 1) if value is None else value for value in (s_dot, s_ddot))

@@ -44,14 +44,14 @@ ARGUMENTS: Mapping[str, Argument] = MappingProxyType(
     {
         "base_transform": Argument("H", (4, 4), "w_H_base, world-from-base, (4, 4) [1, m]."),
         "joint_positions": Argument("s", (None, 1), "s, (n, 1) [rad or m], in the order of `joint_names`."),
-        "base_velocity": Argument("v_b", (6, 1), "v_b, (6, 1) [m/s, rad/s], linear part first, as represented."),
+        "base_velocity": Argument("v_b", (6, 1), "v_b, (6, 1) [m/s, rad/s], linear part first."),
         "joint_velocities": Argument("s_dot", (None, 1), "ṡ, (n, 1) [rad/s or m/s]."),
         "base_acceleration": Argument("v_b_dot", (6, 1), "The derivative of the six numbers v_b [m/s², rad/s²]."),
         "joint_accelerations": Argument("s_ddot", (None, 1), "s̈, (n, 1) [rad/s² or m/s²]."),
         "joint_torques": Argument("tau", (None, 1), "τ, (n, 1) [N m or N]."),
     }
 )
-"""The arguments of all quantities, by name."""
+"""The arguments of all quantities, by name; v_b and its derivative are in the chosen representation."""
 
 _OTHERS = {
     "frame": "Name of a frame: any link of the URDF.",
@@ -86,7 +86,8 @@ def quantity(formula: Formula) -> Formula:
     """Return the method that checks its arguments and evaluates what `formula` writes down.
 
     Raises (the method):
-        InputError: an argument has another shape than `ARGUMENTS` says, or holds a NaN or an infinity.
+        InputError: an argument has another shape than `ARGUMENTS` says, or holds a NaN or an infinity; or CasADi does
+            not take the library's `f_opts`.
         ModelError: there is no such frame.
     """
     signature, name = inspect.signature(formula), formula.__name__
@@ -157,6 +158,8 @@ def _function(
         try:
             return cs.Function(safe, [*symbols, *wrenches], [expression], labels, [output], library.f_opts)
         except (RuntimeError, NotImplementedError) as error:
+            if not library.f_opts:
+                raise
             why = str(error).splitlines()[1:2]
             raise InputError(f"{safe}: CasADi takes no f_opts = {library.f_opts}: {''.join(why)}") from error
 
