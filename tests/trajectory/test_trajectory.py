@@ -146,3 +146,10 @@ def test_what_has_no_labels_is_named_with_what_exists(ironcub):
 
 def test_the_frame_of_a_quantity_is_stated_where_its_rows_have_a_direction():
     assert all((quantity.frame == "world") == (quantity.rows > 1) for quantity in QUANTITIES.values())
+
+
+@pytest.mark.parametrize("name", ["contact_force", "com_position", "time"])
+def test_what_is_no_quantity_of_contact_points_is_named_with_those_that_are(trajectory, name):
+    with pytest.raises(InputError, match="unknown quantity of contact points") as error:
+        trajectory.per_contact(name)
+    assert str(error.value).endswith("Available: contact_positions, contact_forces, contact_force_rates")

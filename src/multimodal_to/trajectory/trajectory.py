@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import TrajectoryError, listed
+from multimodal_to.errors import InputError, TrajectoryError, listed, unknown
 from multimodal_to.files.writing import whole
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing, text, texts
 from multimodal_to.trajectory.quantities import QUANTITIES, labels
@@ -123,7 +123,14 @@ class Trajectory:
         return labels(name, self)
 
     def per_contact(self, name: str) -> Array:
-        """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1)."""
+        """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1).
+
+        Raises:
+            InputError: there is no such quantity of contact points.
+        """
+        known = [key for key, quantity in QUANTITIES.items() if quantity.of == "contact"]
+        if name not in known:
+            raise InputError(unknown("quantity of contact points", name, known))
         rows = QUANTITIES[name].rows
         return getattr(self, name).reshape(len(self.contact_names), rows, self.time.size)  # type: ignore[no-any-return]
 
