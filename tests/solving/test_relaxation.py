@@ -10,11 +10,11 @@ import pytest
 
 import multimodal_to as mt
 from multimodal_to.errors import InputError
-from multimodal_to.ocp.naming import components
 from multimodal_to.solving import relaxation as room
+from multimodal_to.trajectory import labels
 
 LEGS = 0.6
-"""How far below the CoM a contact point may be [m], see CONTACT_REACH; a standing CoM cannot be higher."""
+"""How far below the iRonCub's CoM a contact point may be [m], its `contact_reach`; a standing CoM cannot be higher."""
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +129,6 @@ def test_every_row_of_every_term_has_a_knot_and_a_name(ironcub):
         assert rows.knots.min() >= 0, name
         assert rows.knots.max() == (0 if name == "static_equilibrium" else 5), name
     assert sorted(np.concatenate([rows.index for rows in problem.rows.values()])) == list(range(problem.row_lower.size))
-    assert set(problem.rows["contact_kinematics"].components) == set(components(ironcub, "contact", 24))
+    assert set(problem.rows["contact_kinematics"].components) == set(labels("contact_positions", ironcub))
     assert set(problem.rows["thrust_dynamics"].components) == set(ironcub.jet_names)
-    assert components(ironcub, "robot", 6)[3] == "angular x"
+    assert problem.rows["static_equilibrium"].components[3] == "angular x"

@@ -19,7 +19,6 @@ from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import Constraint, equal
-from multimodal_to.ocp.variables import CONTACT_REACH
 from multimodal_to.scenarios.scenario import Vector3
 
 
@@ -41,11 +40,12 @@ def height(task: Task) -> Iterator[Symptom]:
         )
     elif isinstance(scenario.surface, FlatGround):
         above = scenario.final_com[2] - scenario.surface.height
-        if task.held(paper.CONTACT_REACH) and above > CONTACT_REACH[2]:
+        reach = task.robot.contact_reach[2]
+        if task.held(paper.CONTACT_REACH) and above > reach:
             yield error(
                 "standing end",
                 f"the CoM has to end {above:.3g} m above the feet, beyond the reach of contact "
-                f"points in the problem, {CONTACT_REACH[2]} m",
+                f"points in the problem, {reach:g} m ('contacts' in [reach] of robot.toml)",
                 _other_height(task, "final"),
             )
 

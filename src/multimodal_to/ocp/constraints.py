@@ -13,7 +13,6 @@ from multimodal_to.models import contact
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
-from multimodal_to.ocp.variables import CONTACT_REACH, JET_REACH
 
 # -------------------------------------------------------------------- at a knot
 
@@ -71,14 +70,15 @@ def complementarity(knot: Knot, parameters: Parameters) -> SX:
 
 
 def contact_reach(knot: Knot, parameters: Parameters) -> SX:
-    """|p_i − x| within the reach of contact points, by axis, as a fraction of it."""
-    arms = [(point - knot.com_position) / cs.DM(CONTACT_REACH) for point in knot.points]
+    """|p_i − x| within the robot's `contact_reach`, by axis, as a fraction of it."""
+    arms = [(point - knot.com_position) / cs.DM(knot.robot.contact_reach) for point in knot.points]
     return cs.vertcat(*arms)
 
 
 def jet_reach(knot: Knot, parameters: Parameters) -> SX:
-    """|p_j − x| within the reach of jets, by axis, as a fraction of it (with p_j = fk_j(q), eq. 22)."""
-    arms = [(knot.pose(jet.frame).translation - knot.com_position) / cs.DM(JET_REACH) for jet in knot.robot.jets]
+    """|p_j − x| within the robot's `jet_reach`, by axis, as a fraction of it (with p_j = fk_j(q), eq. 22)."""
+    reach = cs.DM(knot.robot.jet_reach)
+    arms = [(knot.pose(jet.frame).translation - knot.com_position) / reach for jet in knot.robot.jets]
     return cs.vertcat(cs.SX(0, 1), *arms)
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.contact import FACES
 from multimodal_to.ocp import constraints, costs
-from multimodal_to.ocp.naming import labels
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import (
     Constraint,
@@ -27,6 +26,7 @@ from multimodal_to.ocp.terms import (
     equal,
 )
 from multimodal_to.scenarios.scenario import Start, Terminal
+from multimodal_to.trajectory.quantities import TWIST, XYZ, XYZW, row_labels
 
 ON_GROUND = 1e-5
 """Largest height of a contact point that stands [m]: a sole has more corners than a plane needs."""
@@ -34,13 +34,10 @@ ON_GROUND = 1e-5
 FORCE = 50.0
 """Size of a force that the solver takes for one [N]."""
 
-AXES = ("x", "y", "z")
-_WRENCH = ("linear x", "linear y", "linear z", "angular x", "angular y", "angular z")
-
 
 def _each(of: str, *axes: str) -> Labels:
     """Return the labels of rows that are repeated for each "joint", "contact" or "jet"."""
-    return lambda parameters: labels(parameters.robot, of, axes or ("",))
+    return lambda parameters: row_labels(parameters.robot, of, axes or ("",))
 
 
 def _hovers_first(parameters: Parameters) -> bool:
@@ -56,16 +53,16 @@ def _stands_last(parameters: Parameters) -> bool:
 UNIT_QUATERNION = Constraint(
     value=constraints.unit_quaternion, within=equal(), unit="1", holds=Where.FIRST_KNOT, when=_hovers_first
 )
-COM_KINEMATICS = Constraint(value=constraints.com_kinematics, within=equal(), unit="m", labels=AXES)
+COM_KINEMATICS = Constraint(value=constraints.com_kinematics, within=equal(), unit="m", labels=XYZ)
 ANGULAR_MOMENTUM_KINEMATICS = Constraint(
     value=constraints.angular_momentum_kinematics,
     within=equal(),
     unit="kg m²/s",
     holds=Where.LATER_KNOTS,
-    labels=AXES,
+    labels=XYZ,
 )
 CONTACT_KINEMATICS = Constraint(
-    value=constraints.contact_kinematics, within=equal(), unit="m", labels=_each("contact", *AXES)
+    value=constraints.contact_kinematics, within=equal(), unit="m", labels=_each("contact", *XYZ)
 )
 NON_PENETRATION = Constraint(
     name="non_penetration",
@@ -81,7 +78,7 @@ FRICTION_CONE = Constraint(
     unit="N",
     holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
     scale=FORCE,
-    labels=lambda parameters: labels(parameters.robot, "contact", FACES[parameters.scenario.friction_cone]),
+    labels=lambda parameters: row_labels(parameters.robot, "contact", FACES[parameters.scenario.friction_cone]),
 )
 COMPLEMENTARITY = Constraint(
     value=constraints.complementarity,
@@ -95,14 +92,14 @@ CONTACT_REACH = Constraint(
     within=between(-1.0, 1.0),
     unit="1",
     holds=Where.LATER_KNOTS,
-    labels=_each("contact", *AXES),
+    labels=_each("contact", *XYZ),
 )
 JET_REACH = Constraint(
     value=constraints.jet_reach,
     within=between(-1.0, 1.0),
     unit="1",
     holds=Where.LATER_KNOTS,
-    labels=_each("jet", *AXES),
+    labels=_each("jet", *XYZ),
 )
 STATIC_EQUILIBRIUM = Constraint(
     value=constraints.static_equilibrium,
@@ -110,7 +107,7 @@ STATIC_EQUILIBRIUM = Constraint(
     unit=("N", "N", "N", "N m", "N m", "N m"),
     holds=Where.FIRST_KNOT,
     scale=FORCE,
-    labels=_WRENCH,
+    labels=TWIST,
 )
 STEADY_THRUST = Constraint(
     value=constraints.steady_thrust,
@@ -126,20 +123,20 @@ MOMENTUM_DYNAMICS = Constraint(
     within=equal(),
     unit=("m/s", "m/s", "m/s", "kg m²/s", "kg m²/s", "kg m²/s"),
     holds=Where.EVERY_INTERVAL,
-    labels=_WRENCH,
+    labels=TWIST,
 )
 COM_INTEGRATION = Constraint(
-    value=constraints.com_integration, within=equal(), unit="m", holds=Where.EVERY_INTERVAL, labels=AXES
+    value=constraints.com_integration, within=equal(), unit="m", holds=Where.EVERY_INTERVAL, labels=XYZ
 )
 BASE_POSITION_INTEGRATION = Constraint(
-    value=constraints.base_position_integration, within=equal(), unit="m", holds=Where.EVERY_INTERVAL, labels=AXES
+    value=constraints.base_position_integration, within=equal(), unit="m", holds=Where.EVERY_INTERVAL, labels=XYZ
 )
 BASE_ORIENTATION_INTEGRATION = Constraint(
     value=constraints.base_orientation_integration,
     within=equal(),
     unit="1",
     holds=Where.EVERY_INTERVAL,
-    labels=(*AXES, "w"),
+    labels=XYZW,
 )
 JOINT_INTEGRATION = Constraint(
     value=constraints.joint_integration,

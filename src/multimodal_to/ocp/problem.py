@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import FormulationError, InputError, ScenarioError, listed
+from multimodal_to.errors import FormulationError, ScenarioError, listed
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.ocp import compiled
 from multimodal_to.ocp.boundary import set_boundary
@@ -24,6 +24,7 @@ from multimodal_to.ocp.variables import Bounds, Layout, ranges
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 from multimodal_to.trajectory.resampling import resample
+from multimodal_to.trajectory.sameness import refuse_other_robot
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,13 +90,7 @@ class Problem:
         Raises:
             InputError: it is a motion of another robot, or of other contact points or jets.
         """
-        for label, here, there in (
-            ("joints", self.robot.joint_names, trajectory.joint_names),
-            ("contact points", self.robot.contact_names, trajectory.contact_names),
-            ("jets", self.robot.jet_names, trajectory.jet_names),
-        ):
-            if here != there:
-                raise InputError(f"the {label} of the motion to start from are {there}; expected {here}")
+        refuse_other_robot(trajectory, self.robot, what="the motion to start from")
         knots = self.scenario.knots
         motion = resample(trajectory, np.linspace(trajectory.time[0], trajectory.time[-1], knots + 1))
         values = np.vstack([getattr(motion, name) for name in self.layout.rows])

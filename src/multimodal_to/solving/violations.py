@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.ocp.naming import components
 from multimodal_to.ocp.problem import Problem, RowSet, missed
-from multimodal_to.trajectory import QUANTITIES
+from multimodal_to.trajectory import labels
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +84,6 @@ def _of_bounds(problem: Problem, outside: Array, tolerance: float) -> list[Viola
     for name, values in problem.layout.read_horizon(outside).items():
         dimension, count = values.shape
         if dimension:
-            labels = components(problem.robot, QUANTITIES[name].of, dimension)
             scale, label = problem.layout.scale[problem.layout.rows[name]], f"bounds of {name}"
             found.append(
                 _violation(
@@ -93,7 +91,7 @@ def _of_bounds(problem: Problem, outside: Array, tolerance: float) -> list[Viola
                     values.ravel(),
                     tolerance,
                     np.tile(np.arange(count), dimension),
-                    np.repeat(labels, count),
+                    np.repeat(labels(name, problem.robot), count),
                     np.repeat(scale, count),
                     np.full(values.size, problem.unit(label)),
                 )
@@ -118,7 +116,7 @@ def _violation(
     scaled: Array,
     tolerance: float,
     knots: NDArray[np.int64],
-    labels: NDArray[np.str_],
+    components: NDArray[np.str_],
     scale: Array,
     units: NDArray[np.str_],
 ) -> Violation:
@@ -129,7 +127,7 @@ def _violation(
         scaled: the amount of each row, in solver units.
         tolerance: from which on a row counts as violated, in solver units.
         knots: that each row is of.
-        labels: what each row is called.
+        components: what each row is called.
         scale: own unit per solver unit, of each row.
         units: of each row.
     """
@@ -137,7 +135,7 @@ def _violation(
     return Violation(
         name=name,
         knot=int(knots[worst]),
-        component=str(labels[worst]),
+        component=str(components[worst]),
         amount=float(scaled[worst] * scale[worst]),
         unit=str(units[worst]),
         scaled=float(scaled[worst]),

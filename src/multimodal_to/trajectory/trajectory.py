@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import LONGEST, TrajectoryError, listed, shortened
+from multimodal_to.errors import LONGEST, InputError, TrajectoryError, listed, shortened, unknown
 from multimodal_to.files.writing import whole
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing, text, texts
+from multimodal_to.trajectory.quantities import QUANTITIES, labels
 
 FORMAT_VERSION = 3
 """Version 1 lacks `scenario_json`, versions 1 and 2 lack `solve_json`; they are read all the same."""
@@ -26,40 +25,6 @@ PAPER_RULE = "backward Euler"
 _NO_ROTATION = 1e-6
 """A quaternion all of whose parts are smaller cannot be made a unit one."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class Quantity:
-    """What one array of a trajectory holds: its rows per body and the count of bodies, unit, and meaning."""
-
-    rows: int
-    of: str  # "robot", "joint", "contact" or "jet": what the rows are repeated for
-    unit: str
-    meaning: str
-
-
-QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
-    {
-        "com_position": Quantity(rows=3, of="robot", unit="m", meaning="x, CoM in the world"),
-        "com_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ẋ"),
-        "com_acceleration": Quantity(rows=3, of="robot", unit="m/s²", meaning="ẍ"),
-        "angular_momentum": Quantity(rows=3, of="robot", unit="kg m²/s", meaning="hω, about the CoM, world axes"),
-        "angular_momentum_rate": Quantity(rows=3, of="robot", unit="N m", meaning="ḣω"),
-        "base_position": Quantity(rows=3, of="robot", unit="m", meaning="p, origin of the base in the world"),
-        "base_quaternion_xyzw": Quantity(rows=4, of="robot", unit="1", meaning="ρ, world-from-base rotation, x y z w"),
-        "base_linear_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ṗ, world axes"),
-        "base_angular_velocity": Quantity(rows=3, of="robot", unit="rad/s", meaning="ω, world axes"),
-        "joint_positions": Quantity(rows=1, of="joint", unit="rad", meaning="s"),
-        "joint_velocities": Quantity(rows=1, of="joint", unit="rad/s", meaning="ṡ"),
-        "contact_positions": Quantity(rows=3, of="contact", unit="m", meaning="p_i, contact points in the world"),
-        "contact_forces": Quantity(rows=3, of="contact", unit="N", meaning="f_i, on the robot, world axes"),
-        "contact_force_rates": Quantity(rows=3, of="contact", unit="N/s", meaning="ḟ_i"),
-        "thrust": Quantity(rows=1, of="jet", unit="N", meaning="T"),
-        "thrust_rate": Quantity(rows=1, of="jet", unit="N/s", meaning="Ṫ"),
-        "thrust_acceleration": Quantity(rows=1, of="jet", unit="N/s²", meaning="T̈"),
-        "throttle": Quantity(rows=1, of="jet", unit="%", meaning="u"),
-    }
-)
-"""The arrays of a `Trajectory` by name; each is (rows × bodies, knots + 1)."""
 
 _LABELS = ("joint_names", "contact_names", "jet_names")
 
@@ -172,8 +137,23 @@ class Trajectory:
             parts.append(f"integration by {rule}")
         return shortened("; ".join(parts), LONGEST)
 
+    def labels(self, name: str) -> tuple[str, ...]:
+        """Return what the rows of a quantity are called, such as `l_knee` or `l_sole_1 z`.
+
+        Raises:
+            InputError: there is no such quantity.
+        """
+        return labels(name, self)
+
     def per_contact(self, name: str) -> Array:
-        """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1)."""
+        """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1).
+
+        Raises:
+            InputError: there is no such quantity of contact points.
+        """
+        known = [key for key, quantity in QUANTITIES.items() if quantity.of == "contact"]
+        if name not in known:
+            raise InputError(unknown("quantity of contact points", name, known))
         rows = QUANTITIES[name].rows
         return getattr(self, name).reshape(len(self.contact_names), rows, self.time.size)  # type: ignore[no-any-return]
 
