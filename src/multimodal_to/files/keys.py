@@ -71,7 +71,14 @@ def _keys(record: type, prefix: str, where: str, unions: Unions) -> Iterator[Key
 
 
 def _within(kind: Any, name: str, where: str, unions: Unions) -> Iterator[Key]:
-    """Return the keys of the tables that a key holds."""
+    """Return the keys of the tables that a key holds.
+
+    Args:
+        kind: the type of the key's value.
+        name: of the key.
+        where: where the key may stand.
+        unions: the classes that may stand for a type.
+    """
     if kind in unions:
         for own, record in unions[kind].items():
             yield from _keys(record, f"{name}.", f"{name}.kind = {own}", unions)

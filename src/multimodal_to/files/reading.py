@@ -24,6 +24,11 @@ _DEEP_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ 
 def read_bytes(path: str | os.PathLike[str], largest: int, error: type[MultimodalError]) -> bytes:
     """Return the content of a regular file of at most so many bytes.
 
+    Args:
+        path: of the file.
+        largest: the most bytes that are read.
+        error: the class of what is raised.
+
     Raises:
         error: the file cannot be read, is no regular file, or is larger.
     """

@@ -84,7 +84,14 @@ class Records:
             raise self.error(f"'{where}': {error}" if where else str(error)) from error
 
     def _one_of(self, kinds: Mapping[str, type], table: Any, where: str, base: Any) -> Any:
-        """Return the record of a table with its kind; of the base's kind, it keeps what the table lacks."""
+        """Return the record of a table with its kind; of the base's kind, it keeps what the table lacks.
+
+        Args:
+            kinds: the classes by their kind.
+            table: as the file has it; a text is a kind alone.
+            where: what errors call it.
+            base: the record that the table changes, if any.
+        """
         table = {"kind": table} if isinstance(table, str) else table
         if not isinstance(table, Mapping):
             raise self._wrong(where, table, "a table with a kind")
@@ -96,7 +103,14 @@ class Records:
         return self._record(kinds[name], rest, where, base if name == own else None)
 
     def value(self, kind: Any, value: Any, key: str, base: Any = None) -> Any:
-        """Return a value as a field's type has it."""
+        """Return a value as a field's type has it.
+
+        Args:
+            kind: the type: a number, text, enumeration, tuple, mapping, dataclass, or one of the unions.
+            value: as the file has it.
+            key: what errors call it.
+            base: the value that a table changes, if any.
+        """
         kind = without_none(kind)
         if kind in self.unions:
             return self._one_of(self.unions[kind], value, key, base)

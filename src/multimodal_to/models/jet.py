@@ -43,7 +43,13 @@ class JetModel:
     """Constant part of T̈ [N/s²]."""
 
     def acceleration(self, thrust: SX, thrust_rate: SX, throttle: SX) -> SX:
-        """Return T̈ [N/s²]."""
+        """Return T̈ [N/s²].
+
+        Args:
+            thrust: T [N].
+            thrust_rate: Ṫ [N/s].
+            throttle: u [%].
+        """
         drift = (
             self.K_T * thrust
             + self.K_TT * thrust**2

@@ -260,7 +260,13 @@ def _proportions(file: RobotFile, contacts: Array, jets: Array) -> tuple[Array, 
 
 
 def _offsets(kindyn: KinDynComputations, posture: Posture, frames: Sequence[str]) -> Array:
-    """Return where frames are from the CoM in a posture, in world axes [m], (frames, 3)."""
+    """Return where frames are from the CoM in a posture, in world axes [m], (frames, 3).
+
+    Args:
+        kindyn: kinematics of the robot.
+        posture: where it is.
+        frames: names of links or frames.
+    """
     com = np.array(kindyn.CoM_position(posture.base_transform, posture.joint_positions)).ravel()
     poses = [kindyn.forward_kinematics(frame, posture.base_transform, posture.joint_positions) for frame in frames]
     return np.array([np.array(pose)[:3, 3] - com for pose in poses]).reshape(-1, 3)

@@ -229,7 +229,14 @@ class HeightField(Relief):
     def sampled(
         cls, height: Callable[[float, float], float], *, x_range: Vector2, y_range: Vector2, spacing: float
     ) -> HeightField:
-        """Return the field of a function h(x, y) [m], sampled with nodes at most `spacing` [m] apart."""
+        """Return the field of a function h(x, y) [m], sampled with nodes at most `spacing` [m] apart.
+
+        Args:
+            height: h, of x and y [m].
+            x_range: least and greatest x of the nodes [m].
+            y_range: least and greatest y of the nodes [m].
+            spacing: greatest distance of neighbours [m].
+        """
         if not spacing > 0:
             raise InputError(f"spacing is {spacing} m; expected a positive number")
         x, y = (

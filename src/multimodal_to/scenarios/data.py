@@ -52,7 +52,14 @@ def from_dict(table: Mapping[str, Any], base: Scenario | None = None) -> Scenari
 
 
 def _raised(height: Any, key: str, position: Any, com: str) -> Vector3:
-    """Return a CoM at another height [m]."""
+    """Return a CoM at another height [m].
+
+    Args:
+        height: what the file has for z [m].
+        key: what the file calls it.
+        position: the CoM whose height it changes [m], as a file has it; None where there is none.
+        com: what that CoM is called.
+    """
     if position is None:
         raise ScenarioError(f"'{key}' changes '{com}', which the scenario lacks")
     x, y, _ = RECORDS.value(Vector3, position, com)
