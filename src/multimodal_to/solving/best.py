@@ -55,22 +55,35 @@ class Best:
     def __init__(self, problem: Problem, checkpoint: Checkpoint | None = None) -> None:
         self._problem, self._checkpoint = problem, checkpoint
         self._kept: Candidate | None = None
-        self.seen = 0  # iterates of the solver
 
     def seed(self, x: Array, label: str) -> None:
         """Keep what a solve starts from, so that it ends with nothing worse."""
         self._keep(self._evaluated(x, 0, label))
 
     def show(self, x: Array, rows: Array, objective: float, iteration: int, label: str) -> None:
-        """Keep an iterate, with its rows g(x), if it is better than the one kept, and see to the checkpoint."""
-        self.seen += 1
+        """Keep an iterate, with its rows g(x), if it is better than the one kept, and see to the checkpoint.
+
+        Args:
+            x: all variables, in solver units.
+            rows: g(x), in solver units.
+            objective: f(x).
+            iteration: its number in the solve.
+            label: as in `Watch`.
+        """
         violation = self._problem.scaled_violation(x, rows)
         self._keep(Candidate(x=x, iteration=iteration, label=label, objective=objective, violation=violation))
         if self._checkpoint is not None and self._kept is not None:
             self._checkpoint.update(self._problem, self._kept, iteration)
 
     def end(self, x: Array, iteration: int, label: str, *, answer: bool) -> Candidate:
-        """Return what a solve ends with: the solver's last x if that is an answer, else the best iterate."""
+        """Return what a solve ends with: the solver's last x if that is an answer, else the best iterate.
+
+        Args:
+            x: the solver's last variables, in solver units.
+            iteration: its number in the solve.
+            label: as in `Watch`.
+            answer: whether the solver calls it one.
+        """
         last = self._evaluated(x, iteration, label)
         self._keep(last)
         return last if answer or self._kept is None else self._kept
@@ -97,6 +110,11 @@ class Checkpoint:
         """Write what is kept if it is new and time has passed, or if it is the first feasible one.
 
         A file that cannot be written is a warning, once: the solve is worth more than its checkpoint.
+
+        Args:
+            problem: that is solved.
+            kept: the best iterate so far.
+            iterations: of the solve so far.
         """
         now, first_feasible = time.perf_counter(), kept.feasible and not (self._written and self._written.feasible)
         if kept is self._written or (now - self._written_at < CHECKPOINT_EVERY and not first_feasible):
