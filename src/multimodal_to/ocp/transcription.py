@@ -193,7 +193,7 @@ def _mapped(function: cs.Function, repeats: int) -> cs.Function:
 
 def _derivative(function: cs.Function, repeats: int) -> cs.Function:
     """Return the same for a function that is not derived again, which may be machine code."""
-    return _mapped(function if repeats == 1 else compiled.kept(function), repeats)
+    return _mapped(function if repeats == 1 else compiled.machine_code(function), repeats)
 
 
 def _hessian(x: cs.MX, p: cs.MX, factor: cs.MX, multipliers: cs.MX, matrix: cs.MX) -> cs.Function:

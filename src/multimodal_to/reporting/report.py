@@ -111,7 +111,7 @@ def _solve_facts(record: Mapping[str, Any], unusual: str = "") -> dict[str, str]
     costliest = sorted(_numbers(costs).items(), key=lambda entry: -entry[1])[:_COSTLIEST]
     return {
         "status": " · ".join(str(record[name]) for name in ("status", "message") if record.get(name)),
-        "kept": "the best iterate of a solve that had not ended" if record.get("kind") == "checkpoint" else "",
+        "unfinished": "the best iterate of a solve that had not ended" if record.get("kind") == "checkpoint" else "",
         "iterations": str(record.get("iterations", "")),
         "time in the solver": _measured(record, "solve_time", ".1f", " s"),
         "objective": _measured(record, "objective", ".6g", ""),
