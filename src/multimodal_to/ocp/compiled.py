@@ -52,7 +52,9 @@ def machine_code(function: cs.Function) -> cs.Function:
 
 
 def is_compiled(function: cs.Function) -> bool:
-    """Return whether a function is machine code."""
+    """Return whether a function is machine code, or a map of what is."""
+    while function.class_name() in ("Map", "ThreadMap"):
+        function = function.info()["f"]  # CasADi 3.7 finds no functions inside a map
     return bool(function.class_name() == "External")
 
 

@@ -42,6 +42,12 @@ _CAPTIONS: Mapping[str, str] = {
 def write_report(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *, meshes: bool = True) -> Path:
     """Write the report of a motion as one page that opens from disk; whole or not at all.
 
+    Args:
+        robot: that moves.
+        trajectory: its motion, with the scenario and the record of its solve where it keeps them.
+        path: of the page.
+        meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
+
     Raises:
         InputError: the trajectory is for another robot.
         OutputError: the folder does not exist or cannot be written.
