@@ -20,7 +20,7 @@ from multimodal_to.cli import main
 from multimodal_to.cli.expectation import TYPICAL_ITERATIONS
 from multimodal_to.cli.showing import _labels
 from multimodal_to.models.terrain import Plane
-from multimodal_to.scenarios.data import stored
+from multimodal_to.scenarios.data import stored, to_json
 from multimodal_to.trajectory import Trajectory
 from synthetic import take_off as synthetic_take_off
 
@@ -178,7 +178,9 @@ def test_a_solve_writes_trajectory_plot_and_replay_even_without_an_answer(stoppe
     assert re.search(
         r"^the trajectory is the best iterate, of iteration \d+: not feasible$", result.stdout, re.MULTILINE
     )
-    assert re.search(r"^missed: \w+ at knot \d+, [\w ]+, by \S+ \S+ \(\d+ of \d+ rows\)$", result.stdout, re.MULTILINE)
+    assert re.search(
+        r"^not met: \w+ at knot \d+, [\w +-]+, by \S+ \S+ \(\d+ of \d+ rows\)$", result.stdout, re.MULTILINE
+    )
     assert sorted(path.name for path in folder.iterdir()) == ["forces.png", "replay.html", "trajectory.npz"]
     assert Trajectory.load(folder / "trajectory.npz").scenario == "take-off"
 
@@ -384,3 +386,29 @@ def test_a_simulation_is_written_only_to_a_trajectory_file(file, tmp_path):
     result = run("simulate", tmp_path / "none.npz")
     assert result.returncode == 2
     assert "no trajectory file" in result.stderr
+
+
+@pytest.fixture(scope="module")
+def with_own_terms(ironcub, tmp_path_factory):
+    """A file of a problem with terms that the command line does not have."""
+    record = json.dumps(
+        {"formulation": {"rule": "backward Euler", "own_terms": ["slow_turns"], "left_out": ["posture"]}}
+    )
+    text = to_json(scenarios.take_off())
+    motion = replace(synthetic_take_off(ironcub), solve_json=record, scenario_json=text)
+    return motion.save(tmp_path_factory.mktemp("own") / "trajectory.npz")
+
+
+OWN_TERMS = "terms of its own: slow_turns; left out of the paper's: posture"
+
+
+def test_a_solve_with_own_terms_is_gone_on_from_in_its_script_only(with_own_terms):
+    result = run("solve", "--resume", with_own_terms)
+    assert result.returncode == 2
+    assert f"a problem that this command does not have ({OWN_TERMS}); go on from it in the script" in result.stderr
+
+
+def test_audit_and_show_name_the_terms_that_they_do_not_have(with_own_terms):
+    assert f"the problem had {OWN_TERMS}; the audit does not judge these" in run("audit", with_own_terms).stdout
+    assert json.loads(run("audit", with_own_terms, "--json").stdout)["formulation"] == OWN_TERMS
+    assert run("show", with_own_terms).stdout.startswith(f"# the problem had {OWN_TERMS}; a scenario does not hold")
