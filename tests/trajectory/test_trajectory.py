@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from multimodal_to.errors import OutputError, TrajectoryError
-from multimodal_to.trajectory import QUANTITIES, Trajectory
+from multimodal_to.trajectory import ENTRIES, QUANTITIES, Trajectory
 from synthetic import take_off as synthetic_take_off
 
 
@@ -31,6 +31,14 @@ def test_the_file_holds_no_pickle_and_the_names_that_others_use(trajectory, tmp_
             archive.files
         )
         assert archive["contact_forces"].shape == (24, trajectory.knots + 1)
+        assert set(archive.files) == {*QUANTITIES, *ENTRIES}
+
+
+def test_a_quantity_of_contact_points_that_does_not_exist_is_refused_with_those_that_do(trajectory):
+    assert trajectory.per_contact("contact_forces").shape == (8, 3, trajectory.knots + 1)
+    for name in ("contact_force", "com_position"):
+        with pytest.raises(TrajectoryError, match=f"unknown quantity of contact points '{name}'.* contact_positions, "):
+            trajectory.per_contact(name)
 
 
 def test_files_of_earlier_versions_are_read_and_those_of_a_later_release_refused(trajectory, tmp_path):

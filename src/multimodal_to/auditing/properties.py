@@ -97,6 +97,15 @@ GAPS = (
     ("thrust_rate", "thrust_acceleration", "N/s", 1e-3),
 )
 """The quantities that backward Euler integrates: name, its rate, unit and limit of what is left."""
+_DIFFERENCES = ("com_acceleration", "angular_momentum_rate", "contact_force_rates", "thrust_acceleration")
+"""Rates that are no variables of the problem: the library's own files hold the difference itself."""
+
+
+def _gap_reason(rate: str, limit: float) -> str:
+    if rate in _DIFFERENCES:
+        return "this library's files hold the difference itself as the rate; the limit is for files from elsewhere"
+    return _FEASIBLE if limit == 1e-5 else "twice what a feasible motion may miss its row by"
+
 
 _INTEGRATION = (
     *(
@@ -104,7 +113,7 @@ _INTEGRATION = (
             name=f"gap of {name}",
             unit=unit,
             limit=limit,
-            reason=_FEASIBLE if limit == 1e-5 else "twice what a feasible motion may miss its row by",
+            reason=_gap_reason(rate, limit),
             meaning=f"gain of `{name}` over an interval minus `{rate}` at its end × Δt",
         )
         for name, rate, unit, limit in GAPS

@@ -1,4 +1,4 @@
-"""Whether weights and allowances name what exists, and whether costs and variables have sizes that can be told apart."""
+"""Whether weights and allowances name what exists, and whether the sizes of costs and variables can be compared."""
 
 from __future__ import annotations
 

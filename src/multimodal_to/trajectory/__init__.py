@@ -1,5 +1,5 @@
 """A motion as arrays with names and units: its file, what follows from it, other times, and the arrays of others."""
 
-from multimodal_to.trajectory.trajectory import QUANTITIES, Quantity, Trajectory
+from multimodal_to.trajectory.trajectory import ENTRIES, FORMATS, QUANTITIES, Entry, Quantity, Trajectory
 
-__all__ = ["QUANTITIES", "Quantity", "Trajectory"]
+__all__ = ["ENTRIES", "FORMATS", "QUANTITIES", "Entry", "Quantity", "Trajectory"]

@@ -13,12 +13,20 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import TrajectoryError, listed
+from multimodal_to.errors import TrajectoryError, listed, unknown
 from multimodal_to.files.writing import whole
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing, text, texts
 
-FORMAT_VERSION = 3
-"""Version 1 lacks `scenario_json`, versions 1 and 2 lack `solve_json`; they are read all the same."""
+FORMATS: Mapping[int, str] = MappingProxyType(
+    {
+        1: "all quantities, time, names of robot and scenario",
+        2: "adds `scenario_json`",
+        3: "adds `solve_json`",
+    }
+)
+"""The versions of the file that are read, and what each one brought."""
+FORMAT_VERSION = max(FORMATS)
+"""The version that is written."""
 
 _NO_ROTATION = 1e-6
 """A quaternion all of whose parts are smaller cannot be made a unit one."""
@@ -37,28 +45,63 @@ class Quantity:
 QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
     {
         "com_position": Quantity(rows=3, of="robot", unit="m", meaning="x, CoM in the world"),
-        "com_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ẋ"),
-        "com_acceleration": Quantity(rows=3, of="robot", unit="m/s²", meaning="ẍ"),
+        "com_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ẋ, world axes"),
+        "com_acceleration": Quantity(rows=3, of="robot", unit="m/s²", meaning="ẍ, world axes"),
         "angular_momentum": Quantity(rows=3, of="robot", unit="kg m²/s", meaning="hω, about the CoM, world axes"),
-        "angular_momentum_rate": Quantity(rows=3, of="robot", unit="N m", meaning="ḣω"),
+        "angular_momentum_rate": Quantity(rows=3, of="robot", unit="N m", meaning="ḣω, about the CoM, world axes"),
         "base_position": Quantity(rows=3, of="robot", unit="m", meaning="p, origin of the base in the world"),
         "base_quaternion_xyzw": Quantity(rows=4, of="robot", unit="1", meaning="ρ, world-from-base rotation, x y z w"),
         "base_linear_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ṗ, world axes"),
         "base_angular_velocity": Quantity(rows=3, of="robot", unit="rad/s", meaning="ω, world axes"),
-        "joint_positions": Quantity(rows=1, of="joint", unit="rad", meaning="s"),
-        "joint_velocities": Quantity(rows=1, of="joint", unit="rad/s", meaning="ṡ"),
+        "joint_positions": Quantity(rows=1, of="joint", unit="rad", meaning="s; in m for a prismatic joint"),
+        "joint_velocities": Quantity(rows=1, of="joint", unit="rad/s", meaning="ṡ; in m/s for a prismatic joint"),
         "contact_positions": Quantity(rows=3, of="contact", unit="m", meaning="p_i, contact points in the world"),
         "contact_forces": Quantity(rows=3, of="contact", unit="N", meaning="f_i, on the robot, world axes"),
-        "contact_force_rates": Quantity(rows=3, of="contact", unit="N/s", meaning="ḟ_i"),
-        "thrust": Quantity(rows=1, of="jet", unit="N", meaning="T"),
+        "contact_force_rates": Quantity(rows=3, of="contact", unit="N/s", meaning="ḟ_i, world axes"),
+        "thrust": Quantity(rows=1, of="jet", unit="N", meaning="T, along −z of the jet's frame"),
         "thrust_rate": Quantity(rows=1, of="jet", unit="N/s", meaning="Ṫ"),
         "thrust_acceleration": Quantity(rows=1, of="jet", unit="N/s²", meaning="T̈"),
-        "throttle": Quantity(rows=1, of="jet", unit="%", meaning="u"),
+        "throttle": Quantity(rows=1, of="jet", unit="%", meaning="u, of the turbine's full throttle"),
     }
 )
 """The arrays of a `Trajectory` by name; each is (rows × bodies, knots + 1)."""
 
 _LABELS = ("joint_names", "contact_names", "jet_names")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """What a file holds beside the quantities: kind of value, meaning, and the format version that brought it."""
+
+    kind: str
+    meaning: str
+    since: int = 1
+
+
+ENTRIES: Mapping[str, Entry] = MappingProxyType(
+    {
+        "format_version": Entry(kind="whole number", meaning="version of the file's format"),
+        "robot": Entry(kind="text", meaning="name of the robot"),
+        "scenario": Entry(kind="text", meaning="name of the scenario"),
+        "scenario_json": Entry(
+            kind="text, JSON",
+            since=2,
+            meaning="the complete scenario, by the scenario's keys; empty where none is known",
+        ),
+        "solve_json": Entry(
+            kind="text, JSON", since=3, meaning="how it was solved; empty where no solver made the motion"
+        ),
+        "time": Entry(kind="numbers, (N + 1,)", meaning="time of the knots [s], increasing"),
+        "knots": Entry(
+            kind="whole number", meaning="N, the number of intervals; for the reader's use, `load` counts `time`"
+        ),
+        "total_time": Entry(kind="number", meaning="last time minus first [s]; for the reader's use"),
+        "joint_names": Entry(kind="texts", meaning="the joints, in the order of s"),
+        "contact_names": Entry(kind="texts", meaning="the frames of the contact points"),
+        "jet_names": Entry(kind="texts", meaning="the jets; empty where the motion uses none"),
+    }
+)
+"""The file's arrays beside those of `QUANTITIES`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -150,8 +193,15 @@ class Trajectory:
         return record
 
     def per_contact(self, name: str) -> Array:
-        """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1)."""
-        rows = QUANTITIES[name].rows
+        """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1).
+
+        Raises:
+            TrajectoryError: there is no quantity of contact points of that name.
+        """
+        known = {key: quantity.rows for key, quantity in QUANTITIES.items() if quantity.of == "contact"}
+        if name not in known:
+            raise TrajectoryError(unknown("quantity of contact points", name, known))
+        rows = known[name]
         return getattr(self, name).reshape(len(self.contact_names), rows, self.time.size)  # type: ignore[no-any-return]
 
     def vertical_contact_force(self) -> Array:
@@ -193,10 +243,13 @@ class Trajectory:
         version = stored.get("format_version")
         if version is None or version.shape != () or version.dtype.kind not in "iu":
             raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it has no format_version")
-        if not 1 <= int(version) <= FORMAT_VERSION:
-            raise TrajectoryError(f"'{source}' has format version {version}; this release reads 1 to {FORMAT_VERSION}")
-        for name in ("scenario_json", "solve_json"):
-            stored.setdefault(name, np.array(""))
+        if int(version) not in FORMATS:
+            raise TrajectoryError(
+                f"'{source}' has format version {version}; this release reads {min(FORMATS)} to {FORMAT_VERSION}"
+            )
+        for name, entry in ENTRIES.items():
+            if entry.since > 1:  # older files lack it
+                stored.setdefault(name, np.array(""))
         refuse_missing(stored, ("robot", "scenario", "time", *_LABELS, *QUANTITIES), source)
         fields: dict[str, Any] = {name: numbers(stored, name, source) for name in ("time", *QUANTITIES)}
         fields |= {name: texts(stored, name, source) for name in _LABELS}

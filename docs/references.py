@@ -1,0 +1,150 @@
+"""The tables of the reference pages, made from the package itself, so that they say what the code does.
+
+A page asks for a table by a comment `<!-- from the code: NAME -->`; `TABLES` holds the names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import MappingProxyType
+
+from multimodal_to.adam import urdf
+from multimodal_to.auditing import PROPERTIES, Judged, Property
+from multimodal_to.files.reading import LARGEST_TOML
+from multimodal_to.models.terrain import MOST_NODES
+from multimodal_to.replay.meshes import LARGEST_MESH
+from multimodal_to.scenarios.scenario import MOST_KNOTS
+from multimodal_to.trajectory import ENTRIES, FORMATS, QUANTITIES, archive
+
+MARK = re.compile(r"<!-- from the code: ([a-z ]+) -->")
+_COUNTS = {"robot": "", "joint": "joints", "contact": "contacts", "jet": "jets"}
+
+
+def fill(markdown: str) -> str:
+    """Return a page with its tables in it.
+
+    Raises:
+        KeyError: a page asks for a table that does not exist.
+    """
+    return MARK.sub(lambda found: TABLES[found[1]](), markdown)
+
+
+def table(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table; a bar inside a cell is escaped."""
+    lines = [titles, ["--"] * len(titles), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |" for line in lines)
+
+
+# ---------------------------------------------------------------- the trajectory's file
+
+
+def quantities() -> str:
+    """Return the quantities of a trajectory."""
+    return table(
+        ("name", "shape", "unit", "meaning"),
+        [
+            (f"`{name}`", _shape(quantity.rows, _COUNTS[quantity.of]), quantity.unit, quantity.meaning)
+            for name, quantity in QUANTITIES.items()
+        ],
+    )
+
+
+def _shape(rows: int, bodies: str) -> str:
+    first = bodies if rows == 1 and bodies else f"{rows} × {bodies}" if bodies else str(rows)
+    return f"({first}, N + 1)"
+
+
+def entries() -> str:
+    """Return what a trajectory's file holds beside the quantities."""
+    return table(
+        ("name", "kind", "since version", "meaning"),
+        [(f"`{name}`", entry.kind, str(entry.since), entry.meaning) for name, entry in ENTRIES.items()],
+    )
+
+
+def formats() -> str:
+    """Return the versions of a trajectory's file."""
+    return table(("format version", "what it brought"), [(str(number), text) for number, text in FORMATS.items()])
+
+
+def limits() -> str:
+    """Return which files are read, within which limits, and by which error they are refused."""
+    return table(
+        ("file", "error", "what is read"),
+        [
+            (
+                "trajectory, `.npz`",
+                "`TrajectoryError`",
+                f"At most {_size(archive.LARGEST_ARCHIVE)}, unpacked {_size(archive.LARGEST_CONTENT)}, and "
+                f"{archive.MOST_ARRAYS} arrays. Sizes are looked up before anything is unpacked. No pickled objects. "
+                f"Numbers are finite and at most {archive.LARGEST_VALUE:.0e}. Each name stands once. Shapes fit each "
+                f"other and the robot. Format versions {min(FORMATS)} to {max(FORMATS)}.",
+            ),
+            (
+                "scenario, `.toml`",
+                "`ScenarioError`",
+                f"At most {_size(LARGEST_TOML)}, {MOST_KNOTS} knots, and {MOST_NODES} nodes of a height field. An "
+                "unknown key is an error that names the nearest one. The name has to be a plain one, because results "
+                "go to a folder of that name.",
+            ),
+            (
+                "`robot.toml`, `dress.toml`",
+                "`ModelError`",
+                f"At most {_size(LARGEST_TOML)}. Unknown keys are errors. The URDF is inside the folder.",
+            ),
+            (
+                "URDF",
+                "`ModelError`",
+                f"At most {_size(urdf.LARGEST_URDF)}, {urdf.MOST_ELEMENTS} elements, {urdf.MOST_LINKS} links and as "
+                "many joints. No document type, so no entities. One tree with one root. Numbers are finite and at most "
+                f"{urdf.LARGEST_NUMBER:.0e}; only joint limits may be larger. Collision shapes, transmissions and "
+                "simulators' elements are not looked at.",
+            ),
+            (
+                "meshes",
+                "none: a warning, and the mesh is not drawn",
+                f"At most {_size(LARGEST_MESH)}. A path that leaves the robot's package by `..` is not followed.",
+            ),
+        ],
+    )
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e6:.0f} MB"
+
+
+# ---------------------------------------------------------------- the audit
+
+
+def properties() -> str:
+    """Return what an audit judges, one table for each condition under which it does."""
+    parts = []
+    for condition in Judged:
+        rows = [
+            (f"`{entry.name}`", entry.meaning, _limit(entry), entry.reason)
+            for entry in PROPERTIES.values()
+            if entry.judged is condition
+        ]
+        head = "Always judged" if condition is Judged.ALWAYS else f"Judged where {condition.value}"
+        parts.append(f"### {head}\n\n{table(('property', 'value', 'limit', 'where the limit comes from'), rows)}")
+    return "\n\n".join(parts)
+
+
+def _limit(entry: Property) -> str:
+    text = f"{entry.limit:g} × weight" if entry.of_weight else f"{entry.limit:g} {entry.unit}".removesuffix(" 1")
+    if entry.second_order_limit is not None:
+        text += f"; second-order cone {entry.second_order_limit:g} {entry.unit}"
+    return text
+
+
+TABLES: Mapping[str, Callable[[], str]] = MappingProxyType(
+    {
+        "quantities": quantities,
+        "entries": entries,
+        "formats": formats,
+        "limits": limits,
+        "properties": properties,
+    }
+)
+"""The tables by the name that a page asks for."""
