@@ -52,7 +52,7 @@ _PHYSICS = (
         name="force balance",
         unit="N",
         limit=1e-2,
-        reason="a feasible motion may miss its row by 1e-5 m/s, which over 0.05 s is 8e-3 N for a robot of 41 kg",
+        reason="a feasible motion may miss its row by 1e-5 m/s, which over 0.05 s is 9e-3 N for a robot of 45 kg",
         meaning="m g + Σ f − m ẍ, largest component: Newton for the whole robot",
     ),
     Property(
