@@ -48,6 +48,7 @@ from rich.table import Column, Table
 from multimodal_to import Robot, Trajectory, load_robot
 from multimodal_to.adam import quaternion
 from multimodal_to.trajectory import QUANTITIES, Quantity
+from multimodal_to.trajectory.quantities import SCALAR
 
 SHORT = 20  # iterations of --short
 NEAR = 1e-3  # how exactly the start is met, and the base upright at the end
@@ -56,8 +57,10 @@ CONTACT_REACH = cs.DM([0.3, 0.3, 0.6])  # from the CoM [m]
 JET_REACH = 0.5  # from the CoM [m]
 VARIABLES = {
     **QUANTITIES,
-    "complementarity_slack": Quantity(rows=1, of="contact", unit="N m", meaning="ε_n, bound of height × normal force"),
-    "sliding_slack": Quantity(rows=1, of="contact", unit="N m", meaning="ε_t, bound of slip × normal force"),
+    "complementarity_slack": Quantity(
+        axes=SCALAR, of="contact", unit="N m", meaning="ε_n, bound of height × normal force"
+    ),
+    "sliding_slack": Quantity(axes=SCALAR, of="contact", unit="N m", meaning="ε_t, bound of slip × normal force"),
 }
 """The decision variables of a knot: all quantities of a trajectory, and the slacks."""
 

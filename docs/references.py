@@ -42,9 +42,15 @@ def table(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def quantities() -> str:
     """Return the quantities of a trajectory."""
     return table(
-        ("name", "shape", "unit", "meaning"),
+        ("name", "shape", "unit", "axes of", "meaning"),
         [
-            (f"`{name}`", _shape(quantity.rows, _COUNTS[quantity.of]), quantity.unit, quantity.meaning)
+            (
+                f"`{name}`",
+                _shape(quantity.rows, _COUNTS[quantity.of]),
+                quantity.unit,
+                quantity.frame or "–",
+                quantity.meaning,
+            )
             for name, quantity in QUANTITIES.items()
         ],
     )

@@ -10,7 +10,14 @@ DOWN = "3.14159265359 0 0"  # of a frame that pushes the robot up
 
 
 def drone(
-    folder: Path, *, jets: bool = True, mass: float = 20.0, tilt: str = DOWN, antenna: bool = False, arm: float = 0.2
+    folder: Path,
+    *,
+    jets: bool = True,
+    mass: float = 20.0,
+    tilt: str = DOWN,
+    antenna: bool = False,
+    arm: float = 0.2,
+    more: str = "",
 ) -> Robot:
     """Return a body of `mass` [kg] with rigid legs at ±`arm` [m] and, under it, a P220 at ±0.2 m of each side.
 
@@ -21,6 +28,7 @@ def drone(
         tilt: of the jets' frames, roll, pitch and yaw [rad].
         antenna: whether a joint turns a link without mass.
         arm: of the feet along x and y [m].
+        more: further tables of its `robot.toml`.
     """
     frames = {f"foot_{index}": (f"{x} {y} -0.4", "0 0 0") for index, (x, y) in enumerate(_corners(arm))}
     frames |= {f"jet_{side}": (f"0 {y} 0", tilt) for side, y in (("left", 0.2), ("right", -0.2))}
@@ -55,6 +63,7 @@ def drone(
                 f"legs = {[name for name in frames if name.startswith('foot')]}",
                 *(_jet(side) for side in ("left", "right") if jets),
                 _model() if jets else "",
+                more,
             ]
         )
     )

@@ -296,7 +296,8 @@ def test_a_drone_without_joints_hops(tmp_path):
         ({"jets": False}, "thrust", "without jets: drone has none"),
         ({"tilt": "1.57079632679 0 0"}, "hover trim", "no joint moves, and within their limits the thrusts leave"),
         ({"tilt": "1.57079632679 0 0", "antenna": True}, "hover trim", "the jets sit on the base"),
-        ({"arm": 0.5}, "reach", "foot_0 is 0.5 m from the CoM along x"),
+        ({"more": "[reach]\ncontacts = [0.1, 0.3, 0.6]"}, "reach", "foot_0 is 0.2 m from the CoM along x"),
+        ({"more": "[reach]\njets = [0.3, 0.1, 0.3]"}, "reach", "the jet left is 0.2 m from the CoM along y"),
     ],
 )
 def test_a_drone_that_cannot_fly_is_refused(tmp_path, shape, finding, sentence):

@@ -75,6 +75,15 @@ def test_a_robot_is_loaded_from_its_folder(folder, ironcub):
         ('name = "right arm"', 'name = "left arm"', "jet given twice: left arm"),
         ('"l_sole_2"', '"r_sole_1"', "contact point given twice: r_sole_1"),
         ("thrust_max = 160.0", "thrust_max = -5", "expected a positive thrust_max"),
+        (
+            "contacts = [0.3, 0.3, 0.6]",
+            "contacts = [0.3, 0.6]",
+            "'contacts' in [reach] is [0.3, 0.6]; expected 3 finite",
+        ),
+        ("jets = [0.5, 0.5, 0.5]", "jets = [0.5, 0, 0.5]", "'jets' in [reach] is [0.5, 0.0, 0.5]; expected three pos"),
+        ("jets = [0.5, 0.5, 0.5]", "jet = [0.5, 0.5, 0.5]", "[reach]: unknown key 'jet'; did you mean 'jets'"),
+        ("lift = 0.04", "lift = 0", "'lift' in [gait] is 0.0; expected a positive number [m]"),
+        ("swing = 0.65", "swing = 65", "'swing' in [gait] is 65.0; expected a number above 0 and at most 1"),
         ("[joints]", "[joints", "not valid TOML"),
     ],
 )

@@ -13,6 +13,7 @@ from multimodal_to import replay
 from multimodal_to.adam import KinDynComputations
 from multimodal_to.adam.urdf import parse_urdf
 from multimodal_to.errors import MultimodalError
+from multimodal_to.models.proportions import Gait
 from multimodal_to.models.robot import JointLimits, Posture, Robot
 from multimodal_to.replay import MeshWarning
 from multimodal_to.replay.dress import read_dress, zero_poses
@@ -216,6 +217,9 @@ def test_a_robot_of_example_robot_data_replays_with_its_meshes(name, tmp_path):
             base_quaternion_xyzw=np.array([0, 0, 0, 1.0]),
             joint_positions=np.zeros(count),
         ),
+        contact_reach=np.ones(3),
+        jet_reach=np.ones(3),
+        gait=Gait(lift=0.01, swing=0.65),
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error", MeshWarning)

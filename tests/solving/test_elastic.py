@@ -14,7 +14,7 @@ from multimodal_to.ocp.naming import components
 from multimodal_to.solving import elastic
 
 LEGS = 0.6
-"""How far below the CoM a contact point may be [m], see CONTACT_REACH; a standing CoM cannot be higher."""
+"""How far below the iRonCub's CoM a contact point may be [m], its `contact_reach`; a standing CoM cannot be higher."""
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from multimodal_to.errors import OutputError, TrajectoryError
-from multimodal_to.trajectory import ENTRIES, QUANTITIES, Trajectory
+from multimodal_to.errors import InputError, OutputError, TrajectoryError
+from multimodal_to.trajectory import ENTRIES, QUANTITIES, Trajectory, labels, row_labels
+from multimodal_to.trajectory.quantities import TWIST, XYZ
 from synthetic import take_off as synthetic_take_off
 
 
@@ -32,13 +33,6 @@ def test_the_file_holds_no_pickle_and_the_names_that_others_use(trajectory, tmp_
         )
         assert archive["contact_forces"].shape == (24, trajectory.knots + 1)
         assert set(archive.files) == {*QUANTITIES, *ENTRIES}
-
-
-def test_a_quantity_of_contact_points_that_does_not_exist_is_refused_with_those_that_do(trajectory):
-    assert trajectory.per_contact("contact_forces").shape == (8, 3, trajectory.knots + 1)
-    for name in ("contact_force", "com_position"):
-        with pytest.raises(TrajectoryError, match=f"unknown quantity of contact points '{name}'.* contact_positions, "):
-            trajectory.per_contact(name)
 
 
 def test_files_of_earlier_versions_are_read_and_those_of_a_later_release_refused(trajectory, tmp_path):
@@ -119,3 +113,44 @@ def test_a_folder_that_does_not_exist_is_named_and_nothing_is_left_behind(trajec
     with pytest.raises(OutputError, match="cannot write"):
         trajectory.save(tmp_path / "missing" / "motion.npz")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_every_row_of_every_quantity_has_a_name_of_its_own(ironcub, trajectory):
+    for name in QUANTITIES:
+        names = trajectory.labels(name)
+        assert len(set(names)) == len(names) == len(getattr(trajectory, name)), name
+        assert labels(name, ironcub) == names
+
+
+def test_rows_are_called_by_their_body_and_axis(ironcub, trajectory):
+    assert trajectory.labels("com_position") == ("x", "y", "z")
+    assert trajectory.labels("base_quaternion_xyzw") == ("x", "y", "z", "w")
+    assert trajectory.labels("joint_velocities") == ironcub.joint_names
+    assert trajectory.labels("contact_forces")[14] == "r_sole_1 z"
+    assert trajectory.labels("thrust") == ("left arm", "right arm", "left chest", "right chest")
+    assert labels("contact_forces", ironcub, separator=".")[14] == "r_sole_1.z"
+
+
+def test_rows_that_are_no_quantity_take_the_axes_they_are_given(ironcub):
+    faces = row_labels(ironcub, "contact", ("+x", "+y", "-x", "-y"))
+    assert faces[:5] == ("l_sole_1 +x", "l_sole_1 +y", "l_sole_1 -x", "l_sole_1 -y", "l_sole_2 +x")
+    assert row_labels(ironcub, "robot", TWIST)[3] == "angular x"
+    assert row_labels(ironcub.with_jets(()), "jet", XYZ) == ()
+
+
+def test_what_has_no_labels_is_named_with_what_exists(ironcub):
+    with pytest.raises(InputError, match="unknown quantity 'thrusts'; did you mean 'thrust'"):
+        labels("thrusts", ironcub)
+    with pytest.raises(InputError, match="unknown kind of body 'jets'; did you mean 'jet'"):
+        row_labels(ironcub, "jets", XYZ)
+
+
+def test_the_frame_of_a_quantity_is_stated_where_its_rows_have_a_direction():
+    assert all((quantity.frame == "world") == (quantity.rows > 1) for quantity in QUANTITIES.values())
+
+
+@pytest.mark.parametrize("name", ["contact_force", "com_position", "time"])
+def test_what_is_no_quantity_of_contact_points_is_named_with_those_that_are(trajectory, name):
+    with pytest.raises(InputError, match="unknown quantity of contact points") as error:
+        trajectory.per_contact(name)
+    assert str(error.value).endswith("Available: contact_positions, contact_forces, contact_force_rates")

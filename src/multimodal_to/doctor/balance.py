@@ -11,15 +11,13 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.doctor.task import Task
 from multimodal_to.models.contact import FrictionCone
-from multimodal_to.models.robot import Posture
+from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.guess import base_transform, contact_positions
 from multimodal_to.ocp.variables import Knot
 
-LEVER = 0.3
-"""What a residual moment is divided by to weigh it against a residual force [m]."""
 LONG_LEVER = 100.0
-"""One with which forces are met first, so that what is left over is a moment wherever it can be one [m]."""
+"""A lever far longer than any robot [m]: forces are met first, and what is left over is a moment if it can be one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,11 +27,12 @@ class Residual:
     force: float  # [N]
     moment: float  # about the CoM [N m]
     carried: float  # the weight [N]
+    lever: float  # what makes a force of a moment [m], see `lever_of`
 
     @property
     def share(self) -> float:
-        """Return the residual as a share of the weight, a moment as the force that makes it at `LEVER`."""
-        return (self.force + self.moment / LEVER) / self.carried
+        """Return the residual as a share of the weight, a moment as the force that makes it at `lever`."""
+        return (self.force + self.moment / self.lever) / self.carried
 
     @property
     def nothing(self) -> bool:
@@ -44,7 +43,7 @@ class Residual:
         return f"{self.force:.3g} N and {self.moment:.3g} N m"
 
 
-def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, lever: float = LEVER) -> Residual:
+def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, lever: float | None = None) -> Residual:
     """Return the least residual, ‖force‖₁ + ‖moment‖₁ / lever, of a posture at rest.
 
     Contact forces lie in the friction pyramid, which holds the second-order cone.
@@ -54,8 +53,10 @@ def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, lever:
         posture: where everything is.
         feet: whether the contact points push.
         thrusts: the greatest thrust of each jet [N], (jets,).
-        lever: what moments are divided by [m]; with an infinite one forces act wherever they are wanted.
+        lever: what moments are divided by [m], by default `lever_of`; with an infinite one forces act wherever they are
+            wanted.
     """
+    lever = lever_of(task.robot) if lever is None else lever
     robot, world = task.robot, replace(task.world, friction_cone=FrictionCone.PYRAMID)
     forces = cs.SX.sym("f", 3 * len(robot.contacts))
     thrust = cs.SX.sym("T", len(robot.jets))
@@ -89,7 +90,13 @@ def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, lever:
         force=float(np.linalg.norm(over[:3])),
         moment=float(np.linalg.norm(over[3:])) if math.isfinite(lever) else 0.0,
         carried=robot.weight,
+        lever=lever_of(robot),
     )
+
+
+def lever_of(robot: Robot) -> float:
+    """Return what weighs a moment against a force [m]: how far along the ground feet may be from the CoM."""
+    return float(robot.contact_reach[:2].max())
 
 
 def knot_of(task: Task, posture: Posture, forces: cs.SX, thrust: cs.SX) -> Knot:

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.task import Task
 from multimodal_to.errors import MultimodalError
-from multimodal_to.ocp import naming
 from multimodal_to.ocp.problem import formulate
 from multimodal_to.ocp.stages import NamedStage
 from multimodal_to.ocp.variables import Bounds, Layout
-from multimodal_to.trajectory import QUANTITIES
+from multimodal_to.trajectory import QUANTITIES, labels
 
 _INTEGRATION = "_integration"  # what the names of rows end with that tie a variable to its own rate and nothing else
 
@@ -42,8 +41,8 @@ def _crossed(task: Task, bounds: Bounds) -> Iterator[Symptom]:
         middle = name == "com_position" and knot == task.scenario.knots // 2
         yield error(
             "bounds",
-            f"{name}[{row}] has to be at least {least:.6g} and at most {greatest:.6g} {QUANTITIES[name].unit} at knot "
-            f"{knot}",
+            f"{name} ({labels(name, task.robot)[row]}) has to be at least {least:.6g} and at most {greatest:.6g} "
+            f"{QUANTITIES[name].unit} at knot {knot}",
             "lower mid_height_min or widen com_range" if middle else "widen the one or the other",
         )
 
@@ -63,7 +62,7 @@ def _unseen(task: Task, layout: Layout, bounds: Bounds, stages: list[NamedStage]
     lost = []
     for name, rows in layout.rows.items():
         free = (bounds.lower[name] < bounds.upper[name]).any(axis=1)
-        components = naming.components(task.robot, QUANTITIES[name].of, free.size)
+        components = labels(name, task.robot)
         lost += [f"{name} of '{components[index]}'" for index in np.flatnonzero(~seen[rows] & free)]
     if lost:
         yield warning(

@@ -17,7 +17,7 @@ from multimodal_to.models.terrain import FlatGround, frame_function
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.constraints import Rows, World
 from multimodal_to.ocp.guess import contact_positions
-from multimodal_to.ocp.variables import CONTACT_REACH, Knot
+from multimodal_to.ocp.variables import Knot
 from multimodal_to.scenarios.scenario import Vector3
 
 
@@ -39,11 +39,12 @@ def height(task: Task) -> Iterator[Symptom]:
         )
     elif isinstance(scenario.surface, FlatGround):
         above = scenario.final_com[2] - scenario.surface.height
-        if above > CONTACT_REACH[2]:
+        reach = task.robot.contact_reach[2]
+        if above > reach:
             yield error(
                 "standing end",
                 f"the CoM has to end {above:.3g} m above the feet, beyond the reach of contact "
-                f"points in the problem, {CONTACT_REACH[2]} m",
+                f"points in the problem, {reach:g} m ('contacts' in [reach] of robot.toml)",
                 _other_height(task, "final"),
             )
 

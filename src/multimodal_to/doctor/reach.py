@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import casadi as cs
 import numpy as np
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.doctor.balance import knot_of
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.task import Task
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.constraints import KnotRows
-from multimodal_to.ocp.variables import CONTACT_REACH, JET_REACH
 
 _TOLERANCE = 1e-6  # [1]
 
@@ -20,13 +20,12 @@ _TOLERANCE = 1e-6  # [1]
 def reach(task: Task) -> Iterator[Symptom]:
     """Hold contact points and jets, in the posture that the problem is built around, to their reach from the CoM."""
     robot = task.robot
-    yield from _beyond(task, constraints.contact_reach, robot.contact_names, CONTACT_REACH, "CONTACT_REACH")
-    yield from _beyond(task, constraints.jet_reach, robot.jet_names, JET_REACH, "JET_REACH")
+    jets = tuple(f"the jet {name}" for name in robot.jet_names)
+    yield from _beyond(task, constraints.contact_reach, robot.contact_names, robot.contact_reach, "contacts")
+    yield from _beyond(task, constraints.jet_reach, jets, robot.jet_reach, "jets")
 
 
-def _beyond(
-    task: Task, rows: KnotRows, names: tuple[str, ...], limits: tuple[float, ...], constant: str
-) -> Iterator[Symptom]:
+def _beyond(task: Task, rows: KnotRows, names: tuple[str, ...], limits: Array, key: str) -> Iterator[Symptom]:
     robot = task.robot
     knot = knot_of(task, task.posture, cs.SX.zeros(3 * len(robot.contacts)), cs.SX.zeros(len(robot.jets)))
     arms = np.abs(np.array(cs.evalf(rows(knot, task.world).expression))).reshape(-1, 3)  # as fractions of the reach
@@ -39,5 +38,5 @@ def _beyond(
         "reach",
         f"{names[point]} is {arms[point, axis] * limits[axis]:.3g} m from the CoM along {'xyz'[axis]} in the posture "
         f"that the problem is built around, and the problem allows {limits[axis]:g} m",
-        f"bring it nearer, or widen {constant} in ocp/variables.py for a robot of this size",
+        f"bring it nearer, or widen '{key}' in the [reach] of the robot's robot.toml",
     )

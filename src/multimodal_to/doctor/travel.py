@@ -10,11 +10,10 @@ import numpy as np
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.task import Task
 from multimodal_to.models.terrain import FlatGround
-from multimodal_to.ocp.variables import CONTACT_REACH
 from multimodal_to.scenarios.scenario import Terminal
 
-_LIMBS = 0.15
-"""How far limbs may carry the CoM beside the base [m], whose speed alone is limited; generous."""
+_LIMBS = 0.25
+"""How far limbs may carry the CoM beside the base, whose speed alone is limited, as a share of the legs' reach [1]."""
 
 
 def speed(task: Task) -> Iterator[Symptom]:
@@ -35,7 +34,7 @@ def speed(task: Task) -> Iterator[Symptom]:
     label, distance, intervals = max(stretches, key=lambda stretch: stretch[1] - furthest(stretch[2]))
     if distance <= furthest(intervals):
         return
-    certain = distance - _LIMBS > furthest(intervals + 1) or intervals <= 0
+    certain = distance - _LIMBS * task.robot.contact_reach[2] > furthest(intervals + 1) or intervals <= 0
     yield (error if certain else warning)(
         "time for the distance",
         f"the CoM has to go {distance:.3g} m {label} in at most {intervals * scenario.interval_max:.3g} s ({intervals} "
@@ -81,7 +80,7 @@ def leap(task: Task) -> Iterator[Symptom]:
     for label, height in heights.items():
         # A contact point keeps its share of the weight up to a height of complementarity_max over that share.
         loose = scenario.complementarity_max * len(robot.contacts) / robot.weight
-        rise = (height or 0.0) - scenario.surface.height - CONTACT_REACH[2] - loose
+        rise = (height or 0.0) - scenario.surface.height - robot.contact_reach[2] - loose
         if height is None or rise <= 0:
             continue
         lift_off, climb = math.sqrt(2 * gravity * rise), math.sqrt(2 * rise / gravity)
@@ -93,7 +92,7 @@ def leap(task: Task) -> Iterator[Symptom]:
                 "allow more knots or a longer interval_max",
             )
         elif lift_off > scenario.base_speed_max:
-            certain = rise - _LIMBS > scenario.base_speed_max * climb
+            certain = rise - _LIMBS * robot.contact_reach[2] > scenario.base_speed_max * climb
             yield (error if certain else warning)(
                 "leap",
                 f"{found} without jets lifts off at {lift_off:.2g} m/s, and base_speed_max is "

@@ -14,10 +14,9 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import OutputError
 from multimodal_to.files.writing import whole
 from multimodal_to.models.robot import Robot
-from multimodal_to.trajectory import QUANTITIES, Quantity, Trajectory
+from multimodal_to.trajectory import QUANTITIES, Trajectory, labels
 from multimodal_to.trajectory.derived import base_poses, generalised_forces
 
-_AXES: Mapping[int, tuple[str, ...]] = {1: ("",), 3: ("x", "y", "z"), 4: ("x", "y", "z", "w")}
 _NAMES = ("joint_names", "contact_names", "jet_names")
 _RATES = "Rates at knot k are those of the interval that ends at k (backward Euler); at knot 0 they are not used."
 CONVENTIONS = (
@@ -29,21 +28,12 @@ CONVENTIONS = (
 
 def columns(trajectory: Trajectory) -> dict[str, tuple[str, Array]]:
     """Return every row of every quantity by name, as ``joint_positions.l_knee``, with its unit and values."""
-    bodies = {
-        "robot": ("",),
-        "joint": trajectory.joint_names,
-        "contact": trajectory.contact_names,
-        "jet": tuple(name.replace(" ", "_") for name in trajectory.jet_names),
-    }
     table = {"time": ("s", trajectory.time)}
     for name, quantity in QUANTITIES.items():
-        for row, label in enumerate(_labels(quantity, bodies[quantity.of])):
-            table[".".join(filter(None, (name, label)))] = (quantity.unit, getattr(trajectory, name)[row])
+        for row, label in enumerate(labels(name, trajectory, separator=".")):
+            place = label.replace(" ", "_") if quantity.of == "jet" else label
+            table[".".join(filter(None, (name, place)))] = (quantity.unit, getattr(trajectory, name)[row])
     return table
-
-
-def _labels(quantity: Quantity, bodies: tuple[str, ...]) -> list[str]:
-    return [".".join(filter(None, (body, axis))) for body in bodies for axis in _AXES[quantity.rows]]
 
 
 def write_csv(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
@@ -74,10 +64,7 @@ def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
         "conventions": "\n".join(CONVENTIONS),
         "units": {name: quantity.unit for name, quantity in QUANTITIES.items()},
         "time": trajectory.time,
-        **{
-            name: np.array(getattr(trajectory, name), dtype=object)
-            for name in ("joint_names", "contact_names", "jet_names")
-        },
+        **{name: np.array(getattr(trajectory, name), dtype=object) for name in _NAMES},
         **{name: getattr(trajectory, name) for name in QUANTITIES},
     }
     with whole(path) as draft:

@@ -114,15 +114,19 @@ class Table:
             raise self._wrong(key, "a text")
         return value
 
-    def number(self, key: str) -> float:
-        """Return a finite number."""
+    def number(self, key: str, default: float | None = None) -> float:
+        """Return a finite number; the default where there is none."""
+        if default is not None and key not in self:
+            return default
         value = self._take(key)
         if not is_number(value):
             raise self._wrong(key, "a finite number")
         return float(value)
 
-    def numbers(self, key: str, count: int) -> NDArray[np.float64]:
-        """Return a list of so many finite numbers, (count,)."""
+    def numbers(self, key: str, count: int, default: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Return a list of so many finite numbers, (count,); the default where there is none."""
+        if default is not None and key not in self:
+            return default
         value = self._take(key)
         if not isinstance(value, list) or len(value) != count or not all(map(is_number, value)):
             raise self._wrong(key, f"{count} finite numbers")

@@ -6,17 +6,21 @@ import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 
+import casadi as cs
 import numpy as np
 
-from multimodal_to.adam import KinDynComputations
+from multimodal_to.adam import KinDynComputations, quaternion
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
+from multimodal_to.errors import ModelError, MultimodalError, listed, shown, unknown
 from multimodal_to.files.reading import Table, read_toml
+from multimodal_to.models import proportions
 from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import Jet, JetModel
+from multimodal_to.models.proportions import Gait
 
 ROBOT_FILE = "robot.toml"
 
@@ -28,6 +32,14 @@ class Posture:
     base_position: Array  # (3,) [m]
     base_quaternion_xyzw: Array  # (4,), unit, world-from-base
     joint_positions: Array  # (n,) [rad or m]
+
+    @property
+    def base_transform(self) -> Array:
+        """Return w_H_base, (4, 4)."""
+        transform = np.eye(4)
+        transform[:3, :3] = np.array(quaternion.rotation_matrix(cs.DM(self.base_quaternion_xyzw)))
+        transform[:3, 3] = self.base_position
+        return transform
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,6 +65,9 @@ class Robot:
     friction: float
     jets: tuple[Jet, ...]
     home: Posture
+    contact_reach: Array  # greatest distance of a contact point from the CoM in a plan, by world axis [m], (3,)
+    jet_reach: Array  # greatest distance of a jet's frame from the CoM in a plan, by world axis [m], (3,)
+    gait: Gait
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -83,6 +98,13 @@ class Robot:
     def weight(self) -> float:
         """Return m |g| [N]."""
         return self.mass * float(np.linalg.norm(self.gravity))
+
+    @cached_property
+    def standing_height(self) -> float:
+        """Return L [m], the robot's own unit of length: the height of its CoM above its contact points at home."""
+        contacts = _offsets(self.kindyn, self.home, self.contact_names)
+        jets = _offsets(self.kindyn, self.home, [jet.frame for jet in self.jets])
+        return proportions.standing_height(contacts, jets)
 
     def with_jets(self, names: Sequence[str]) -> Robot:
         """Return the robot with only the jets of these names, in this order; with none it has none to use.
@@ -166,6 +188,7 @@ def _robot(table: Table, folder: Path) -> Robot:
         base_quaternion_xyzw=quaternion / np.linalg.norm(quaternion),
         joint_positions=home_joints,
     )
+    contact_reach, jet_reach, gait = _proportions(table, kindyn, posture, contacts, jets)
     for part in (contact, home, table):
         part.done()
     return Robot(
@@ -178,7 +201,41 @@ def _robot(table: Table, folder: Path) -> Robot:
         friction=friction,
         jets=jets,
         home=posture,
+        contact_reach=contact_reach,
+        jet_reach=jet_reach,
+        gait=gait,
     )
+
+
+def _proportions(
+    table: Table, kindyn: KinDynComputations, home: Posture, contacts: Sequence[ContactPoint], jets: Sequence[Jet]
+) -> tuple[Array, Array, Gait]:
+    """Return the reach of contact points and of jets [m], (3,) each, and the gait: as stated, else in units of L."""
+    reach, gait = (table.table(key) if key in table else Table({}, f"[{key}]", ModelError) for key in ("reach", "gait"))
+    points = _offsets(kindyn, home, [contact.frame for contact in contacts])
+    nozzles = _offsets(kindyn, home, [jet.frame for jet in jets])
+    height = proportions.standing_height(points, nozzles)
+    contact_reach = reach.numbers("contacts", 3, default=proportions.contact_reach(points, height))
+    jet_reach = reach.numbers("jets", 3, default=proportions.jet_reach(nozzles, height))
+    lift = gait.number("lift", default=proportions.LIFT * height)
+    swing = gait.number("swing", default=proportions.SWING)
+    for key, axes in (("contacts", contact_reach), ("jets", jet_reach)):
+        if min(axes) <= 0:
+            raise ModelError(f"'{key}' in [reach] is {shown(axes.tolist())}; expected three positive numbers [m]")
+    if lift <= 0:
+        raise ModelError(f"'lift' in [gait] is {lift}; expected a positive number [m]")
+    if not 0 < swing <= 1:
+        raise ModelError(f"'swing' in [gait] is {swing}; expected a number above 0 and at most 1")
+    reach.done()
+    gait.done()
+    return contact_reach, jet_reach, Gait(lift=lift, swing=swing)
+
+
+def _offsets(kindyn: KinDynComputations, posture: Posture, frames: Sequence[str]) -> Array:
+    """Return where frames are from the CoM in a posture, in world axes [m], (frames, 3)."""
+    com = np.array(kindyn.CoM_position(posture.base_transform, posture.joint_positions)).ravel()
+    poses = [kindyn.forward_kinematics(frame, posture.base_transform, posture.joint_positions) for frame in frames]
+    return np.array([np.array(pose)[:3, 3] - com for pose in poses]).reshape(-1, 3)
 
 
 def _refuse_repeated(kind: str, names: Sequence[str]) -> None:

@@ -20,7 +20,7 @@ from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Remembered, Surface
 from multimodal_to.ocp.integrators import gap, rotation_gap
-from multimodal_to.ocp.variables import CONTACT_REACH, JET_REACH, Knot
+from multimodal_to.ocp.variables import Knot
 from multimodal_to.scenarios.scenario import Scenario
 
 
@@ -138,14 +138,15 @@ def complementarity(knot: Knot, world: World) -> Rows:
 
 
 def contact_reach(knot: Knot, world: World) -> Rows:
-    """|p_i − x| within CONTACT_REACH, by axis, as a fraction of it."""
-    arms = [(point - knot.com_position) / cs.DM(CONTACT_REACH) for point in knot.points]
+    """|p_i − x| within the robot's `contact_reach`, by axis, as a fraction of it."""
+    arms = [(point - knot.com_position) / cs.DM(knot.robot.contact_reach) for point in knot.points]
     return Rows(expression=cs.vertcat(*arms), lower=-1.0, upper=1.0, unit="1", of="contact")
 
 
 def jet_reach(knot: Knot, world: World) -> Rows:
-    """|p_j − x| within JET_REACH, by axis, as a fraction of it (with p_j = fk_j(q), eq. 22)."""
-    arms = [(knot.pose(jet.frame).translation - knot.com_position) / cs.DM(JET_REACH) for jet in world.robot.jets]
+    """|p_j − x| within the robot's `jet_reach`, by axis, as a fraction of it (with p_j = fk_j(q), eq. 22)."""
+    reach = cs.DM(knot.robot.jet_reach)
+    arms = [(knot.pose(jet.frame).translation - knot.com_position) / reach for jet in world.robot.jets]
     return Rows(expression=cs.vertcat(cs.SX(0, 1), *arms), lower=-1.0, upper=1.0, unit="1", of="jet")
 
 

@@ -10,18 +10,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.models.proportions import Gait
 from multimodal_to.scenarios.scenario import Scenario, Terminal
 
-SWING = 0.65  # share of a step's time in which its foot is in the air [1]
-LIFT = 0.04  # height of a swing [m]
 GROUNDED = 0.8  # share of the horizon before a motion that ends in the air leaves the ground [1]
 
 
-def steps(feet: Sequence[str], scenario: Scenario, travelled: Array) -> tuple[Array, Array]:
+def steps(feet: Sequence[str], gait: Gait, scenario: Scenario, travelled: Array) -> tuple[Array, Array]:
     """Return how far each contact point has moved [m], (contacts, 3, N + 1), and its share of the load.
 
     Args:
         feet: the foot of each contact point.
+        gait: how high and how long feet swing.
         scenario: its `guess_steps` are spread evenly over the time on the ground, feet taking turns.
         travelled: how far the CoM has moved at every knot [m], (3, N + 1).
     """
@@ -33,11 +33,11 @@ def steps(feet: Sequence[str], scenario: Scenario, travelled: Array) -> tuple[Ar
     window = leaves / scenario.guess_steps
     for step in range(scenario.guess_steps):
         foot, end = step % len(names), round((step + 1) * window)
-        begin = max(round((step + 1 - SWING) * window), 1)
+        begin = max(round((step + 1 - gait.swing) * window), 1)
         stride = travelled[:, leaves] * [1, 1, 0] * (step + 1) / scenario.guess_steps - moved[foot, :, begin]
         phase = np.arange(1, end - begin + 1) / (end - begin + 1)
         moved[foot, :, begin:end] += stride[:, None] * phase
-        moved[foot, 2, begin:end] += LIFT * np.sin(np.pi * phase)
+        moved[foot, 2, begin:end] += gait.lift * np.sin(np.pi * phase)
         moved[foot, :, end:] += stride[:, None]
         stands[foot, begin:end] = False
     moved[:, :, leaves:] += travelled[:, leaves:] - travelled[:, [leaves]]

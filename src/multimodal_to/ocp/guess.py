@@ -93,10 +93,7 @@ def contact_positions(robot: Robot, posture: Posture) -> Array:
 
 def base_transform(posture: Posture) -> Array:
     """Return w_H_base of a posture, (4, 4)."""
-    transform = np.eye(4)
-    transform[:3, :3] = np.array(quaternion.rotation_matrix(cs.DM(posture.base_quaternion_xyzw)))
-    transform[:3, 3] = posture.base_position
-    return transform
+    return posture.base_transform
 
 
 def start_guess(robot: Robot, scenario: Scenario, standing: Posture) -> Array:
@@ -120,7 +117,7 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture) -> Array:
     flown = _weight_flown(robot, scenario)
     _set_jets(robot, scenario, view, flown)
     feet = [contact.foot for contact in robot.contacts]
-    moved, shares = steps(feet, scenario, travelled) if scenario.guess_steps else _glide(feet, travelled)
+    moved, shares = steps(feet, robot.gait, scenario, travelled) if scenario.guess_steps else _glide(feet, travelled)
     points = contact_positions(robot, standing).reshape(-1, 3, 1) + moved
     ground = heights_below(scenario.surface, points.transpose(1, 0, 2).reshape(3, -1)).reshape(-1, knots)
     points[:, 2] += ground - ground[:, :1]

@@ -6,14 +6,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from multimodal_to.models.robot import Robot
+from multimodal_to.trajectory.quantities import TWIST, XYZ, XYZW, row_labels
 
-_AXES: Mapping[int, tuple[str, ...]] = MappingProxyType(
-    {
-        3: ("x", "y", "z"),
-        4: ("x", "y", "z", "w"),
-        6: ("linear x", "linear y", "linear z", "angular x", "angular y", "angular z"),
-    }
-)
+_AXES: Mapping[int, tuple[str, ...]] = MappingProxyType({3: XYZ, 4: XYZW, 6: TWIST})
 
 
 def components(robot: Robot, of: str, count: int) -> tuple[str, ...]:
@@ -21,7 +16,6 @@ def components(robot: Robot, of: str, count: int) -> tuple[str, ...]:
 
     Such as `l_knee`, or `l_sole_1 z` where there are three rows for each.
     """
-    bodies = {"robot": ("",), "joint": robot.joint_names, "contact": robot.contact_names, "jet": robot.jet_names}[of]
-    each = count // len(bodies) if bodies else 0
-    axes = _AXES.get(each, ("",) * each)
-    return tuple(" ".join(filter(None, (body, axis))) for body in bodies for axis in axes)
+    bodies = len(row_labels(robot, of, ("",)))
+    each = count // bodies if bodies else 0
+    return row_labels(robot, of, _AXES.get(each, ("",) * each))

@@ -39,9 +39,6 @@ SCALES = {
 """
 INTERVAL_SCALE = 0.1  # of Δt [s]
 
-CONTACT_REACH = (0.3, 0.3, 0.6)  # greatest distance of a contact point from the CoM, by axis [m]
-JET_REACH = (0.5, 0.5, 0.5)  # greatest distance of a jet from the CoM, by axis [m]
-
 
 @dataclass(frozen=True)
 class Layout:

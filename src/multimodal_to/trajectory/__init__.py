@@ -1,5 +1,7 @@
 """A motion as arrays with names and units: its file, what follows from it, other times, and the arrays of others."""
 
-from multimodal_to.trajectory.trajectory import ENTRIES, FORMATS, QUANTITIES, Entry, Quantity, Trajectory
+from multimodal_to.trajectory.format import ENTRIES, FORMATS, Entry
+from multimodal_to.trajectory.quantities import QUANTITIES, Quantity, labels, row_labels
+from multimodal_to.trajectory.trajectory import Trajectory
 
-__all__ = ["ENTRIES", "FORMATS", "QUANTITIES", "Entry", "Quantity", "Trajectory"]
+__all__ = ["ENTRIES", "FORMATS", "QUANTITIES", "Entry", "Quantity", "Trajectory", "labels", "row_labels"]

@@ -13,7 +13,8 @@ from multimodal_to.errors import TrajectoryError, shown
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing
 from multimodal_to.trajectory.derived import contact_points
-from multimodal_to.trajectory.trajectory import QUANTITIES, Trajectory
+from multimodal_to.trajectory.quantities import QUANTITIES
+from multimodal_to.trajectory.trajectory import Trajectory
 
 COMPUTED = ("contact_positions",)
 """What bare arrays need not hold: it follows from the others."""

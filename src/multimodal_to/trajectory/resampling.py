@@ -8,7 +8,8 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError
-from multimodal_to.trajectory.trajectory import QUANTITIES, Trajectory
+from multimodal_to.trajectory.quantities import QUANTITIES
+from multimodal_to.trajectory.trajectory import Trajectory
 
 
 def resample(trajectory: Trajectory, times: Array) -> Trajectory:

@@ -4,104 +4,24 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import TrajectoryError, listed, unknown
+from multimodal_to.errors import InputError, TrajectoryError, listed, unknown
 from multimodal_to.files.writing import whole
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing, text, texts
-
-FORMATS: Mapping[int, str] = MappingProxyType(
-    {
-        1: "all quantities, time, names of robot and scenario",
-        2: "adds `scenario_json`",
-        3: "adds `solve_json`",
-    }
-)
-"""The versions of the file that are read, and what each one brought."""
-FORMAT_VERSION = max(FORMATS)
-"""The version that is written."""
+from multimodal_to.trajectory.format import ENTRIES, FORMAT_VERSION, FORMATS
+from multimodal_to.trajectory.quantities import QUANTITIES, labels
 
 _NO_ROTATION = 1e-6
 """A quaternion all of whose parts are smaller cannot be made a unit one."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Quantity:
-    """What one array of a trajectory holds: its rows per body and the count of bodies, unit, and meaning."""
-
-    rows: int
-    of: str  # "robot", "joint", "contact" or "jet": what the rows are repeated for
-    unit: str
-    meaning: str
-
-
-QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
-    {
-        "com_position": Quantity(rows=3, of="robot", unit="m", meaning="x, CoM in the world"),
-        "com_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ẋ, world axes"),
-        "com_acceleration": Quantity(rows=3, of="robot", unit="m/s²", meaning="ẍ, world axes"),
-        "angular_momentum": Quantity(rows=3, of="robot", unit="kg m²/s", meaning="hω, about the CoM, world axes"),
-        "angular_momentum_rate": Quantity(rows=3, of="robot", unit="N m", meaning="ḣω, about the CoM, world axes"),
-        "base_position": Quantity(rows=3, of="robot", unit="m", meaning="p, origin of the base in the world"),
-        "base_quaternion_xyzw": Quantity(rows=4, of="robot", unit="1", meaning="ρ, world-from-base rotation, x y z w"),
-        "base_linear_velocity": Quantity(rows=3, of="robot", unit="m/s", meaning="ṗ, world axes"),
-        "base_angular_velocity": Quantity(rows=3, of="robot", unit="rad/s", meaning="ω, world axes"),
-        "joint_positions": Quantity(rows=1, of="joint", unit="rad", meaning="s; in m for a prismatic joint"),
-        "joint_velocities": Quantity(rows=1, of="joint", unit="rad/s", meaning="ṡ; in m/s for a prismatic joint"),
-        "contact_positions": Quantity(rows=3, of="contact", unit="m", meaning="p_i, contact points in the world"),
-        "contact_forces": Quantity(rows=3, of="contact", unit="N", meaning="f_i, on the robot, world axes"),
-        "contact_force_rates": Quantity(rows=3, of="contact", unit="N/s", meaning="ḟ_i, world axes"),
-        "thrust": Quantity(rows=1, of="jet", unit="N", meaning="T, along −z of the jet's frame"),
-        "thrust_rate": Quantity(rows=1, of="jet", unit="N/s", meaning="Ṫ"),
-        "thrust_acceleration": Quantity(rows=1, of="jet", unit="N/s²", meaning="T̈"),
-        "throttle": Quantity(rows=1, of="jet", unit="%", meaning="u, of the turbine's full throttle"),
-    }
-)
-"""The arrays of a `Trajectory` by name; each is (rows × bodies, knots + 1)."""
-
 _LABELS = ("joint_names", "contact_names", "jet_names")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Entry:
-    """What a file holds beside the quantities: kind of value, meaning, and the format version that brought it."""
-
-    kind: str
-    meaning: str
-    since: int = 1
-
-
-ENTRIES: Mapping[str, Entry] = MappingProxyType(
-    {
-        "format_version": Entry(kind="whole number", meaning="version of the file's format"),
-        "robot": Entry(kind="text", meaning="name of the robot"),
-        "scenario": Entry(kind="text", meaning="name of the scenario"),
-        "scenario_json": Entry(
-            kind="text, JSON",
-            since=2,
-            meaning="the complete scenario, by the scenario's keys; empty where none is known",
-        ),
-        "solve_json": Entry(
-            kind="text, JSON", since=3, meaning="how it was solved; empty where no solver made the motion"
-        ),
-        "time": Entry(kind="numbers, (N + 1,)", meaning="time of the knots [s], increasing"),
-        "knots": Entry(
-            kind="whole number", meaning="N, the number of intervals; for the reader's use, `load` counts `time`"
-        ),
-        "total_time": Entry(kind="number", meaning="last time minus first [s]; for the reader's use"),
-        "joint_names": Entry(kind="texts", meaning="the joints, in the order of s"),
-        "contact_names": Entry(kind="texts", meaning="the frames of the contact points"),
-        "jet_names": Entry(kind="texts", meaning="the jets; empty where the motion uses none"),
-    }
-)
-"""The file's arrays beside those of `QUANTITIES`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -192,16 +112,24 @@ class Trajectory:
             raise TrajectoryError(f"the record of the solve of '{self.scenario}' is no JSON object")
         return record
 
+    def labels(self, name: str) -> tuple[str, ...]:
+        """Return what the rows of a quantity are called, such as `l_knee` or `l_sole_1 z`.
+
+        Raises:
+            InputError: there is no such quantity.
+        """
+        return labels(name, self)
+
     def per_contact(self, name: str) -> Array:
         """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1).
 
         Raises:
-            TrajectoryError: there is no quantity of contact points of that name.
+            InputError: there is no such quantity of contact points.
         """
-        known = {key: quantity.rows for key, quantity in QUANTITIES.items() if quantity.of == "contact"}
+        known = [key for key, quantity in QUANTITIES.items() if quantity.of == "contact"]
         if name not in known:
-            raise TrajectoryError(unknown("quantity of contact points", name, known))
-        rows = known[name]
+            raise InputError(unknown("quantity of contact points", name, known))
+        rows = QUANTITIES[name].rows
         return getattr(self, name).reshape(len(self.contact_names), rows, self.time.size)  # type: ignore[no-any-return]
 
     def vertical_contact_force(self) -> Array:
