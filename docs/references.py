@@ -5,8 +5,12 @@ A page asks for a table by a comment `<!-- from the code: NAME -->`; `TABLES` ho
 
 from __future__ import annotations
 
+import ast
+import importlib
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path
 from types import MappingProxyType
 
 from multimodal_to.adam import urdf
@@ -144,6 +148,62 @@ def _limit(entry: Property) -> str:
     return text
 
 
+# ---------------------------------------------------------------- the rooms
+
+_LAYERING = Path(__file__).parents[1] / "tests" / "test_layering.py"
+_WIDTH, _HEIGHT, _GAP = 720, 34, 6  # of the picture, a floor, and what is between two [pixel]
+
+
+def floors() -> list[list[str]]:
+    """Return the rooms from the ground up, as the test of the layering holds them; files at the top are no rooms."""
+    tree = ast.parse(_LAYERING.read_text(encoding="utf-8"))
+    (value,) = (
+        node.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and [target.id for target in node.targets] == ["FLOORS"]
+    )
+    every = [sorted(name for name in rooms if not name.startswith("__")) for rooms in ast.literal_eval(value)]
+    return [rooms for rooms in every if rooms]
+
+
+def rooms() -> str:
+    """Return what each room holds, by the first line of its docstring, from the top of the house down."""
+    return table(
+        ("floor", "room", "what it holds"),
+        [
+            (str(level), f"`{name}`", _first_line(name))
+            for level, names in reversed([*enumerate(floors(), 1)])
+            for name in names
+        ],
+    )
+
+
+def _first_line(room: str) -> str:
+    return (importlib.import_module(f"multimodal_to.{room}").__doc__ or "").strip().partition("\n")[0]
+
+
+def rooms_picture() -> str:
+    """Return the house as SVG in the text's colour."""
+    every = floors()
+    parts = []
+    for level, names in enumerate(every):
+        y = (len(every) - 1 - level) * (_HEIGHT + _GAP) + 1
+        width = (_WIDTH - _GAP * (len(names) - 1)) / len(names)
+        for place, name in enumerate(names):
+            x = place * (width + _GAP) + 1
+            parts.append(
+                f'<rect x="{x:.0f}" y="{y}" width="{width - 2:.0f}" height="{_HEIGHT}" rx="4" fill="currentColor" '
+                'fill-opacity="0.08" stroke="currentColor" stroke-opacity="0.5"/>'
+                f'<text x="{x + width / 2:.0f}" y="{y + 22}" text-anchor="middle" fill="currentColor" '
+                f'font-size="14">{escape(name)}</text>'
+            )
+    height = len(every) * (_HEIGHT + _GAP)
+    return (
+        f'<svg viewBox="0 0 {_WIDTH} {height}" role="img" aria-label="The rooms of the package, one floor a line" '
+        f'style="max-width: {_WIDTH}px">{"".join(parts)}</svg>'
+    )
+
+
 TABLES: Mapping[str, Callable[[], str]] = MappingProxyType(
     {
         "quantities": quantities,
@@ -151,6 +211,8 @@ TABLES: Mapping[str, Callable[[], str]] = MappingProxyType(
         "formats": formats,
         "limits": limits,
         "properties": properties,
+        "rooms": rooms,
+        "rooms picture": rooms_picture,
     }
 )
 """The tables by the name that a page asks for."""
