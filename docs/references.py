@@ -199,7 +199,7 @@ def rooms_picture() -> str:
             )
     height = len(every) * (_HEIGHT + _GAP)
     return (
-        f'<svg viewBox="0 0 {_WIDTH} {height}" role="img" aria-label="The rooms of the package, one floor a line" '
+        f'<svg viewBox="0 0 {_WIDTH + 2} {height}" role="img" aria-label="The rooms of the package, one floor a line" '
         f'style="max-width: {_WIDTH}px">{"".join(parts)}</svg>'
     )
 
