@@ -13,35 +13,65 @@ from multimodal_to.errors import MultimodalError
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.models.terrain import FlatGround, HeightField, Plane, Stairs
-from multimodal_to.ocp import Problem, build, precompile
+from multimodal_to.ocp import (
+    Constraint,
+    Cost,
+    Formulation,
+    Interval,
+    Knot,
+    Parameters,
+    Problem,
+    Where,
+    at_least,
+    at_most,
+    between,
+    build,
+    equal,
+    precompile,
+)
 from multimodal_to.scenarios import Scenario, Start, Terminal, Weights
 from multimodal_to.scenarios import files as scenario_files
-from multimodal_to.solving import Ipopt, Solution, Status, relax, solve
+from multimodal_to.solving import Ending, Ipopt, Solution, Solver, StartPoint, Status, Watch, relax, solve
 from multimodal_to.trajectory import Trajectory
 
 __all__ = [
     "Audit",
+    "Constraint",
+    "Cost",
     "Diagnosis",
+    "Ending",
     "FlatGround",
+    "Formulation",
     "FrictionCone",
     "HeightField",
+    "Interval",
     "Ipopt",
     "KinDynComputations",
+    "Knot",
     "MultimodalError",
+    "Parameters",
     "Plane",
     "Problem",
     "Robot",
     "Scenario",
     "Solution",
+    "Solver",
     "Stairs",
     "Start",
+    "StartPoint",
     "Status",
     "Terminal",
     "Trajectory",
+    "Watch",
     "Weights",
+    "Where",
+    "at_least",
+    "at_most",
     "audit",
+    "between",
     "build",
     "doctor",
+    "equal",
     "load_robot",
     "precompile",
     "relax",

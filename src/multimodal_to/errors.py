@@ -39,6 +39,10 @@ class ScenarioError(MultimodalError):
     """A scenario is unknown, contradicts itself, or does not fit its robot."""
 
 
+class FormulationError(MultimodalError):
+    """A term, or a formulation, is not what a problem can be made of."""
+
+
 class SolverError(MultimodalError):
     """The solver could not be run at all; a solve that ends without an answer is a status, not an error."""
 

@@ -56,19 +56,27 @@ BAD = {
     "a document type": (LAUGHS + robot(link("a")), "document type"),
     "an entity bomb": (f'<!DOCTYPE r [<!ENTITY e0 "x">{BOMB}]>' + robot(link("&e11;")), "valid XML|document type"),
     "a file of someone else": (
-        '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/hostname">]>' + robot(link("a", "&x;")), "document type"),
+        '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/hostname">]>' + robot(link("a", "&x;")),
+        "document type",
+    ),
     "a link without a name": (robot("<link/>"), "no name"),
     "a joint without a type": (robot(link("a"), '<joint name="j"/>'), "no type"),
     "a joint without a parent": (
-        robot(link("a"), '<joint name="j" type="fixed"><child link="a"/></joint>'), "no parent"),
+        robot(link("a"), '<joint name="j" type="fixed"><child link="a"/></joint>'),
+        "no parent",
+    ),
     "two links of one name": (robot(link("a"), link("a")), "more than one link named a"),
     "two joints of one name": (
-        robot(link("a"), link("b"), link("c"), joint("j", "a", "b"), joint("j", "a", "c")), "one joint named j"),
+        robot(link("a"), link("b"), link("c"), joint("j", "a", "b"), joint("j", "a", "c")),
+        "one joint named j",
+    ),
     "a joint to nowhere": (robot(link("a"), joint("j", "a", "b")), "'b', which does not exist"),
     "several roots": (robot(link("a"), link("b")), "2 trees, with the roots a, b"),
     "a loop": (robot(link("r"), link("a"), link("b"), joint("j", "a", "b"), joint("k", "b", "a")), "loop"),
     "a link on two joints": (
-        robot(link("a"), link("b"), link("c"), joint("j", "a", "c"), joint("k", "b", "c")), "child of two joints"),
+        robot(link("a"), link("b"), link("c"), joint("j", "a", "c"), joint("k", "b", "c")),
+        "child of two joints",
+    ),
     "a link on itself": (robot(link("a"), joint("j", "a", "a")), "loop"),
     "a floating joint": (pair(kind="floating"), "'j' is of type 'floating'"),
     "a planar joint": (pair(kind="planar"), "'j' is of type 'planar'"),
@@ -76,7 +84,7 @@ BAD = {
     "a zero axis": (pair('<axis xyz="0 0 0"/>' + LIMIT), "no direction"),
     "an axis of two numbers": (pair('<axis xyz="0 1"/>' + LIMIT), "3 finite numbers"),
     "an axis of words": (pair('<axis xyz="up 0 0"/>' + LIMIT), "3 finite numbers"),
-    "a NaN in a mass": (pair(child=inertia(mass="nan")), 'value="nan" of <mass> in \'b\''),
+    "a NaN in a mass": (pair(child=inertia(mass="nan")), "value=\"nan\" of <mass> in 'b'"),
     "an infinite inertia": (pair(child=inertia(xx="inf")), "not a finite number"),
     "an empty mass": (pair(child=inertia(mass="")), "not a finite number"),
     "a mass without a value": (pair(child="<inertial><mass/></inertial>"), "<mass> in .* has no value"),
@@ -87,9 +95,16 @@ BAD = {
     "a limit that is no number": (pair('<limit lower="nan" upper="1" effort="1" velocity="1"/>'), 'lower="nan"'),
     "no mass at all": (robot(link("a", ""), link("b", ""), joint("j", "a", "b")), "no mass"),
     "a mimic joint that moves": (
-        robot(link("a"), link("b"), link("c"), joint("j", "a", "b"),
-              joint("k", "a", "c", inside=f'<mimic joint="j"/>{LIMIT}')), "'k' mimics 'j'"),
-}  # fmt: skip
+        robot(
+            link("a"),
+            link("b"),
+            link("c"),
+            joint("j", "a", "b"),
+            joint("k", "a", "c", inside=f'<mimic joint="j"/>{LIMIT}'),
+        ),
+        "'k' mimics 'j'",
+    ),
+}
 
 
 @pytest.mark.parametrize("case", BAD)

@@ -100,7 +100,10 @@ def test_a_force_in_a_corner_of_the_pyramid_is_outside_the_second_order_cone(iro
 
 def test_a_trajectory_of_another_robot_is_refused(ironcub, take_off):
     names = ("other", *take_off.trajectory.joint_names[1:])
-    with pytest.raises(InputError, match="the joints of the trajectory are"):
+    with pytest.raises(
+        InputError,
+        match="the trajectory is for another robot: its joints are other, torso_roll",
+    ):
         audit(ironcub, replace(take_off.trajectory, joint_names=names))
 
 

@@ -11,10 +11,10 @@ import pytest
 from multimodal_to.errors import InputError
 from multimodal_to.models import bspline
 from multimodal_to.models.terrain import (
+    CachedSurface,
     FlatGround,
     HeightField,
     Plane,
-    Remembered,
     Stairs,
     frame,
     frame_function,
@@ -168,7 +168,7 @@ def test_a_remembered_surface_says_the_same_and_asks_once():
             return super().height_and_slopes(x, y)
 
     plane = Counted(slope=0.2)
-    remembered, point = Remembered(plane), cs.DM([0.3, 0.2, 0.5])
+    remembered, point = CachedSurface(plane), cs.DM([0.3, 0.2, 0.5])
     parts = [remembered.distance(point), remembered.normal(point), remembered.tangents(point)]
     assert len(asked) == 1
     for part, expected in zip(parts, frame(plane, point), strict=True):

@@ -119,7 +119,7 @@ def test_another_motion_is_drawn_with_the_first_in_step_and_faint(robot, traject
 
 def test_a_motion_of_another_robot_is_no_ghost(robot, trajectory, tmp_path):
     stranger = replace(trajectory, robot="stranger")
-    with pytest.raises(InputError, match="of 'stranger' with 23 joints; expected 'ironcub'"):
+    with pytest.raises(InputError, match="with it is for another robot: 'stranger'; expected 'ironcub'"):
         replay.write_html(robot, trajectory, tmp_path / "both.html", ghost=stranger)
 
 

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-PUBLISHED = Path(__file__).parents[3] / "shared" / "ironcub" / "published"
-
-needs_published = pytest.mark.skipif(
-    not PUBLISHED.is_dir(), reason="the paper's published trajectories are not beside this checkout"
-)
+from published_runs import PUBLISHED, needs_published
 
 
 @needs_published

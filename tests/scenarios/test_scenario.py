@@ -10,7 +10,7 @@ from multimodal_to.errors import ModelError, ScenarioError
 from multimodal_to.models.terrain import Plane, Stairs, heights_below
 from multimodal_to.ocp import build
 from multimodal_to.ocp.guess import base_transform, contact_positions, standing_posture
-from multimodal_to.ocp.variables import ranges
+from multimodal_to.ocp.variables import Layout, ranges
 from multimodal_to.scenarios import Weights
 
 
@@ -73,7 +73,7 @@ def test_a_start_that_contradicts_the_joint_limits_is_refused(ironcub, scenario)
 
 def test_an_end_that_contradicts_the_bounds_is_refused(ironcub, scenario):
     """A hover has to end upright; a base that may not turn so far is told which variable at which knot."""
-    bounds = ranges(ironcub, scenario)
+    bounds = ranges(ironcub, scenario, Layout.of(ironcub))
     bounds.lower["base_quaternion_xyzw"][0] = 0.2
     with pytest.raises(
         ScenarioError, match=r"base_quaternion_xyzw\[0\] has to be 0 at knot 70, outside its range 0.2 to 1"

@@ -160,7 +160,9 @@ def test_a_short_stand_stays_where_it_is(ironcub, take_off):
 
 
 def test_a_plan_for_other_jets_is_refused(ironcub):
-    with pytest.raises(TrajectoryError, match="not those of the robot"):
+    with pytest.raises(
+        TrajectoryError, match=r"the plan is for another robot: its jets are .*; those of ironcub are none"
+    ):
         play(ironcub.with_jets(()), synthetic_take_off(ironcub))
 
 

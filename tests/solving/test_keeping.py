@@ -15,9 +15,10 @@ import pytest
 import multimodal_to as mt
 from multimodal_to.errors import SolverError
 from multimodal_to.scenarios import files as scenario_files
-from multimodal_to.solving import best, solution
+from multimodal_to.solving import best, ipopt
 from multimodal_to.solving.best import FEASIBLE, Best, Checkpoint
-from multimodal_to.solving.solvers import Phase
+from multimodal_to.solving.ipopt import Pass
+from multimodal_to.solving.solver import StartPoint
 from multimodal_to.trajectory import QUANTITIES
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
@@ -47,12 +48,18 @@ def shown(monkeypatch):
     iterates = []
     original = Best.show
 
-    def show(self, x, rows, objective, iteration, phase):
+    def show(self, x, rows, objective, iteration, label):
         iterates.append((x, objective, iteration))
-        original(self, x, rows, objective, iteration, phase)
+        original(self, x, rows, objective, iteration, label)
 
     monkeypatch.setattr(Best, "show", show)
     return iterates
+
+
+def variables(problem, trajectory):
+    """Return x of a trajectory as it is, which an iterate on the way may have a little outside its bounds."""
+    values = np.vstack([getattr(trajectory, name) for name in problem.layout.rows])
+    return np.append(values.ravel(order="F"), trajectory.duration / trajectory.knots) / problem.scale
 
 
 def expected(problem, iterates):
@@ -74,19 +81,19 @@ def test_a_solve_cut_short_ends_with_the_best_of_all_its_iterates(problem, shown
     assert np.allclose(problem.start_from(cut.trajectory), shown[index][0], atol=1e-7)
     record = cut.trajectory.solve_record()
     assert (record["status"], record["feasible"]) == ("iteration limit", feasible)
-    assert bool(cut.misses) == (not feasible)
+    assert bool(cut.unmet) == (not feasible)
 
 
 def test_a_time_limit_ends_with_an_iterate_and_its_status(problem):
     cut = mt.solve(problem, mt.Ipopt(time_limit=0.1))
     assert cut.status is mt.Status.TIME_LIMIT
     assert cut.solve_time < 5.0
-    assert cut.objective == pytest.approx(sum(problem.costs(problem.start_from(cut.trajectory)).values()), rel=1e-6)
+    assert cut.objective == pytest.approx(sum(problem.costs(variables(problem, cut.trajectory)).values()), rel=1e-6)
 
 
 def test_feasible_beats_infeasible_then_the_objective_counts(problem):
     def kept(violation, objective):
-        return best.Kept(x=problem.guess, iteration=0, phase=Phase.EXACT, objective=objective, violation=violation)
+        return best.Candidate(x=problem.guess, iteration=0, label="exact", objective=objective, violation=violation)
 
     assert kept(0.9 * FEASIBLE, 9.0).better_than(kept(2.0 * FEASIBLE, 1.0))
     assert kept(0.9 * FEASIBLE, 1.0).better_than(kept(0.0, 2.0))
@@ -116,17 +123,17 @@ def test_ctrl_c_in_a_script_ends_the_solve_and_what_it_found_is_returned(problem
 
 
 def test_a_crash_in_the_middle_loses_nothing(problem, monkeypatch):
-    run = solution._run
+    run = ipopt._run
 
-    def crash(problem, x, options, watcher, phase):
-        if phase is Phase.EXACT:
+    def crash(problem, x, options, watcher):
+        if watcher.which is Pass.EXACT:
             raise SolverError("the linear solver is gone")
-        return run(problem, x, options, watcher, phase)
+        return run(problem, x, options, watcher)
 
-    monkeypatch.setattr(solution, "_run", crash)
+    monkeypatch.setattr(ipopt, "_run", crash)
     crashed = mt.solve(problem)
     assert (crashed.status, crashed.solver_message) == (mt.Status.FAILED, "the linear solver is gone")
-    assert 0 < crashed.iteration <= 20  # of the rough phase
+    assert 0 < crashed.iteration <= 20  # of the rough pass
     assert crashed.feasible
 
 
@@ -153,7 +160,7 @@ def test_a_checkpoint_is_a_trajectory_that_says_what_it_is_and_is_gone_on_from(p
     assert files.count(True) == 1  # the first feasible iterate is written at once, before which there is none
     checkpoint = mt.Trajectory.load(path)
     record = checkpoint.solve_record()
-    assert (record["kind"], record["status"], record["phase"], record["feasible"]) == (
+    assert (record["kind"], record["status"], record["pass"], record["feasible"]) == (
         "checkpoint",
         "running",
         "rough",
@@ -169,12 +176,19 @@ def test_a_checkpoint_is_a_trajectory_that_says_what_it_is_and_is_gone_on_from(p
     assert resumed.objective == pytest.approx(whole.objective, rel=1e-3)
 
 
-def test_what_was_not_feasible_goes_on_in_the_phase_that_it_was_in(problem):
-    rough = mt.solve(problem, mt.Ipopt(max_iterations=6)).trajectory
-    exact = replace(rough, solve_json=rough.solve_json.replace('"phase": "rough"', '"phase": "exact"'))
-    assert solution._phases(rough) == (Phase.ROUGH, Phase.EXACT)
-    assert solution._phases(exact) == (Phase.EXACT,)
-    assert solution._phases(replace(rough, solve_json="")) == (Phase.WARM,)
+def test_what_was_not_feasible_goes_on_in_the_pass_that_it_was_in(problem):
+    def passes(record):
+        return ipopt._passes(StartPoint(x=problem.guess, record=record))
+
+    rough = mt.solve(problem, mt.Ipopt(max_iterations=6)).trajectory.solve_record()
+    assert rough["pass"] == "rough"
+    assert passes(rough) == (Pass.ROUGH, Pass.EXACT)
+    assert passes(rough | {"pass": "exact"}) == (Pass.EXACT,)
+    assert passes(rough | {"feasible": True}) == (Pass.WARM,)
+    assert passes({}) == (Pass.WARM,)
+    assert passes(None) == (Pass.ROUGH, Pass.EXACT)
+    older = {"phase" if key == "pass" else key: value for key, value in rough.items()}
+    assert passes(older) == (Pass.ROUGH, Pass.EXACT)
 
 
 def test_a_solve_that_goes_on_ends_with_nothing_worse_than_it_started_from(problem):
@@ -193,7 +207,7 @@ def test_checkpoints_are_written_seldom_but_the_first_feasible_one_at_once(probl
     checkpoint = Checkpoint(path, {})
 
     def update(iteration, violation):
-        kept = best.Kept(x=x, iteration=iteration, phase=Phase.EXACT, objective=1.0, violation=violation)
+        kept = best.Candidate(x=x, iteration=iteration, label="exact", objective=1.0, violation=violation)
         checkpoint.update(problem, kept, iteration)
         return mt.Trajectory.load(path).solve_record()["iteration"] if path.exists() else None
 

@@ -9,8 +9,8 @@ import pytest
 import multimodal_to as mt
 from multimodal_to.errors import InputError, SolverError
 from multimodal_to.solving import linear_solvers
+from multimodal_to.solving.ipopt import Pass
 from multimodal_to.solving.linear_solvers import LINEAR_SOLVERS, LinearSolver, choose
-from multimodal_to.solving.solvers import Phase
 
 HERE = LinearSolver(name="mumps")
 
@@ -128,7 +128,7 @@ def test_each_solver_that_is_missing_has_advice():
 
 def test_the_chosen_solver_and_its_library_reach_ipopt(monkeypatch, library):
     children(monkeypatch, {"ma57": WORKS})
-    options = mt.Ipopt(linear_solver="ma57", hsl_library=library).options(10, 1.0, Phase.EXACT)
+    options = mt.Ipopt(linear_solver="ma57", hsl_library=library).options(10, 1.0, Pass.EXACT)
     assert (options["linear_solver"], options["hsllib"]) == ("ma57", library)
     with pytest.raises(InputError, match="is no file"):
         mt.Ipopt(hsl_library="/no/such/libhsl.so")

@@ -51,7 +51,10 @@ def test_a_changed_target_and_another_grid_end_where_a_cold_solve_does(ironcub, 
 
 
 def test_a_motion_with_other_jets_is_refused(ironcub, answer):
-    with pytest.raises(InputError, match="the jets of the motion to start from are"):
+    with pytest.raises(
+        InputError,
+        match="the motion to start from is for another robot: its jets are none",
+    ):
         mt.build(ironcub, replace(mt.scenarios.take_off(), knots=5)).start_from(answer.trajectory)
 
 

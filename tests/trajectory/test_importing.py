@@ -2,12 +2,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_published import PUBLISHED, needs_published
 
 from multimodal_to.auditing.audit import audit
 from multimodal_to.errors import TrajectoryError
 from multimodal_to.trajectory import QUANTITIES
 from multimodal_to.trajectory.importing import COMPUTED, import_arrays
+from published_runs import PUBLISHED, needs_published
 from synthetic import take_off as synthetic_take_off
 
 

@@ -10,10 +10,12 @@ from collections.abc import Mapping
 
 import casadi as cs
 
+from multimodal_to.adam.centroidal import composite_inertias
 from multimodal_to.adam.kinematics import Pose, joint_pose
 from multimodal_to.adam.rnea import applied_wrenches
 from multimodal_to.adam.spatial import SX, Inertia, symmetric
 from multimodal_to.adam.tree import BASE, Tree
+from multimodal_to.errors import ModelError
 
 
 def forward_dynamics(
@@ -30,11 +32,11 @@ def forward_dynamics(
 
     Args:
         tree: the robot.
-        base: pose of the base in the world.
-        s: joint positions.
-        base_twist: (ṗ, ω) of the base in world axes.
-        s_dot: joint velocities.
-        torques: of the joints [N m or N].
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+        base_twist: (ṗ, ω) of the base in world axes, (6, 1) [m/s, rad/s].
+        s_dot: joint velocities, (n, 1) [rad/s or m/s].
+        torques: of the joints, (n, 1) [N m or N].
         gravity: acceleration of free fall in world axes [m/s²], (3, 1).
         wrenches: by frame name, the (force, moment) that the world applies there, at the frame's origin, world axes.
     """
@@ -91,6 +93,19 @@ def forward_dynamics(
     result[:3] = base.rotation @ accelerations[BASE][:3] + gravity
     result[3:6] = base.rotation @ accelerations[BASE][3:]
     return result
+
+
+def refuse_massless_joints(tree: Tree) -> None:
+    """Refuse a robot that ABA would divide by nothing for.
+
+    Raises:
+        ModelError: a joint moves nothing that has mass, so that its acceleration is undefined.
+    """
+    composites = composite_inertias(tree, cs.DM.ones(len(tree.joints)))
+    for body, composite in zip(tree.bodies[1:], composites[1:], strict=True):
+        moved = composite.mass if body.prismatic else composite.about_origin[2, 2]
+        if float(moved) <= 0:
+            raise ModelError(f"joint '{body.joint}' moves nothing that has mass, so its acceleration is undefined")
 
 
 def _spatial(inertia: Inertia) -> SX:

@@ -28,7 +28,13 @@ def com_in_base(tree: Tree, s: SX) -> SX:
 
 
 def com_position(tree: Tree, base: Pose, s: SX) -> SX:
-    """Return the CoM in the world [m], (3, 1)."""
+    """Return the CoM in the world [m], (3, 1).
+
+    Args:
+        tree: the robot.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+    """
     return base.rotation @ com_in_base(tree, s) + base.translation
 
 
@@ -66,6 +72,13 @@ def body_motions(tree: Tree, s: SX, velocity: SX, omega: SX, s_dot: SX) -> BodyM
     """Return how all bodies move when the base does with (`velocity`, `omega`), both in base axes.
 
     Twists go outward: ω_i = Rᵀ ω + z q̇, v_i = Rᵀ (v + ω × p), and l = m v + ω × h, k = I ω + h × v.
+
+    Args:
+        tree: the robot.
+        s: joint positions, (n, 1) [rad or m].
+        velocity: of the base's origin, in base axes, (3, 1) [m/s].
+        omega: angular velocity of the base, in base axes, (3, 1) [rad/s].
+        s_dot: joint velocities, (n, 1) [rad/s or m/s].
     """
     poses = [Pose(cs.SX.eye(3), cs.SX.zeros(3))] + [joint_pose(body, s) for body in tree.bodies[1:]]
     velocities, omegas = [velocity], [omega]
@@ -86,7 +99,13 @@ def body_motions(tree: Tree, s: SX, velocity: SX, omega: SX, s_dot: SX) -> BodyM
 def momentum_in_base(tree: Tree, s: SX, angular_velocity: SX, s_dot: SX) -> tuple[Momentum, SX]:
     """Return the momentum about the base's origin while that origin rests, and the first moment, in base axes.
 
-    `angular_velocity` is the base's, in base axes [rad/s]. Momenta and first moments of the bodies are gathered inward.
+    Momenta and first moments of the bodies are gathered inward.
+
+    Args:
+        tree: the robot.
+        s: joint positions, (n, 1) [rad or m].
+        angular_velocity: of the base, in base axes, (3, 1) [rad/s].
+        s_dot: joint velocities, (n, 1) [rad/s or m/s].
     """
     bodies = body_motions(tree, s, cs.SX.zeros(3), angular_velocity, s_dot)
     masses = [body.inertia.mass for body in tree.bodies]
@@ -108,6 +127,13 @@ def centroidal_momentum(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX
 
     The angular part depends on neither the base's position nor its linear velocity: k_G = k_B − c × l_B with
     momenta taken while the base's origin rests, since a common velocity adds none about the CoM.
+
+    Args:
+        tree: the robot.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+        base_twist: (ṗ, ω) of the base in world axes, (6, 1) [m/s, rad/s].
+        s_dot: joint velocities, (n, 1) [rad/s or m/s].
     """
     in_base = base.rotation.T @ base_twist[3:]
     momentum, first_moment = momentum_in_base(tree, s, in_base, s_dot)
@@ -116,13 +142,29 @@ def centroidal_momentum(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX
 
 
 def com_velocity(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX) -> SX:
-    """Return ẋ in world axes [m/s], (3, 1): the base's velocity and, over the mass, the momentum seen from it."""
+    """Return ẋ in world axes [m/s], (3, 1): the base's velocity and, over the mass, the momentum seen from it.
+
+    Args:
+        tree: the robot.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+        base_twist: (ṗ, ω) of the base in world axes, (6, 1) [m/s, rad/s].
+        s_dot: joint velocities, (n, 1) [rad/s or m/s].
+    """
     momentum, _ = momentum_in_base(tree, s, base.rotation.T @ base_twist[3:], s_dot)
     return base_twist[:3] + base.rotation @ (momentum.linear / tree.total_mass)
 
 
 def kinetic_energy(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX) -> SX:
-    """Return T = ½ Σ (v·l + ω·k) over the bodies [J], which is ½ νᵀ M ν."""
+    """Return T = ½ Σ (v·l + ω·k) over the bodies [J], which is ½ νᵀ M ν.
+
+    Args:
+        tree: the robot.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+        base_twist: (ṗ, ω) of the base in world axes, (6, 1) [m/s, rad/s].
+        s_dot: joint velocities, (n, 1) [rad/s or m/s].
+    """
     back = base.rotation.T
     bodies = body_motions(tree, s, back @ base_twist[:3], back @ base_twist[3:], s_dot)
     doubled = 0
@@ -132,5 +174,12 @@ def kinetic_energy(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX) -> 
 
 
 def potential_energy(tree: Tree, base: Pose, s: SX, gravity: SX) -> SX:
-    """Return V = −m g·x [J], zero where the CoM passes the world's origin."""
+    """Return V = −m g·x [J], zero where the CoM passes the world's origin.
+
+    Args:
+        tree: the robot.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+        gravity: acceleration of free fall in world axes, (3, 1) [m/s²].
+    """
     return -tree.total_mass * cs.dot(gravity, com_position(tree, base, s))

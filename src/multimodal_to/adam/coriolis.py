@@ -22,6 +22,13 @@ def coriolis_matrix(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX) ->
     −l × ϖ and the moment D ϖ, where D = −S(h) S(v) − S(ω) (½ tr(I) 1 − I). As in CRBA, sums over the bodies that hang
     on a joint are gathered inward first. The base's linear velocity does not enter: seen from a frame that moves along
     with it, the robot is the same.
+
+    Args:
+        tree: the robot.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+        base_twist: (ṗ, ω) of the base in world axes, (6, 1) [m/s, rad/s].
+        s_dot: joint velocities, (n, 1) [rad/s or m/s].
     """
     units = unit_momenta(tree, base, s)
     bodies = body_motions(tree, s, cs.SX.zeros(3), base.rotation.T @ base_twist[3:], s_dot)

@@ -31,6 +31,11 @@ def unit_momenta(tree: Tree, base: Pose, s: SX) -> UnitMomenta:
 
     A unit velocity of joint i moves all that hangs on it, with the composite inertia (m, h, I) of body i:
     l = z × h, k = I z + p_i × l, or l = m z, k = h × z + p_i × l when prismatic.
+
+    Args:
+        tree: the robot.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
     """
     composites = composite_inertias(tree, s)
     poses = body_poses(tree, Pose(base.rotation, cs.SX.zeros(3)), s)
@@ -51,7 +56,13 @@ def unit_momenta(tree: Tree, base: Pose, s: SX) -> UnitMomenta:
 
 
 def to_base(pose: Pose, linear: SX, angular: SX) -> SX:
-    """Return a momentum or wrench at a body's origin, in body axes, at the base's origin: (R l, R k + p × R l)."""
+    """Return a momentum or wrench at a body's origin, in body axes, at the base's origin: (R l, R k + p × R l).
+
+    Args:
+        pose: the body's, in the base.
+        linear: momentum [kg m/s] or force [N] in body axes, (3, 1).
+        angular: angular momentum [kg m²/s] or moment [N m] about the body's origin, in body axes, (3, 1).
+    """
     turned = pose.rotation @ linear
     return cs.vertcat(turned, pose.rotation @ angular + cs.cross(pose.translation, turned))
 
@@ -74,6 +85,11 @@ def mass_matrix(tree: Tree, base: Pose, s: SX) -> SX:
 
     M_ij of joint i and a joint j above it is the momentum that joint i gives, along the motion of joint j; joints on
     different branches do not meet.
+
+    Args:
+        tree: the robot.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
     """
     units = unit_momenta(tree, base, s)
     motions = joint_motions(tree, units.poses)
@@ -89,7 +105,13 @@ def mass_matrix(tree: Tree, base: Pose, s: SX) -> SX:
 
 
 def centroidal_momentum_matrix(tree: Tree, base: Pose, s: SX) -> SX:
-    """Return J_CMM(q), (6, 6 + n), with h = J_CMM ν about the CoM: the unit momenta of CRBA, moved there."""
+    """Return J_CMM(q), (6, 6 + n), with h = J_CMM ν about the CoM: the unit momenta of CRBA, moved there.
+
+    Args:
+        tree: the robot.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+    """
     units = unit_momenta(tree, base, s)
     matrix = cs.SX(units.columns)
     matrix[3:, :3] = 0
@@ -100,5 +122,11 @@ def centroidal_momentum_matrix(tree: Tree, base: Pose, s: SX) -> SX:
 
 
 def com_jacobian(tree: Tree, base: Pose, s: SX) -> SX:
-    """Return J_CoM(q), (3, 6 + n), with ẋ = J_CoM ν: the linear unit momenta over the mass."""
+    """Return J_CoM(q), (3, 6 + n), with ẋ = J_CoM ν: the linear unit momenta over the mass.
+
+    Args:
+        tree: the robot.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+    """
     return cs.sparsify(unit_momenta(tree, base, s).columns[:3, :] / tree.total_mass)

@@ -78,6 +78,11 @@ def describe(
 ) -> Description:
     """Return what a URDF holds; by default all joints move that can, and those that mimic another are locked.
 
+    Args:
+        urdf: path of a URDF, or its XML text.
+        joint_names: joints that move, in the order of s.
+        locked: positions of joints held still, by name [rad or m]; zero by default.
+
     Raises:
         ModelError: the file is missing or no URDF, or it describes something that no robot can have.
     """
@@ -93,7 +98,13 @@ def describe(
 
 
 def findings(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tuple[Finding, ...]:
-    """Return what looks wrong about the links and joints, link by link and joint by joint."""
+    """Return what looks wrong about the links and joints, link by link and joint by joint.
+
+    Args:
+        tree: the robot that the links and joints form.
+        links: of the URDF.
+        joints: of the URDF.
+    """
     found = [Finding(subject=f"link '{link.name}'", text=text) for link in links for text in _link_findings(link)]
     moving, carried = set(tree.joint_names), _carried_masses(links, joints)
     for joint in joints:

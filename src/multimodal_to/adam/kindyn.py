@@ -1,63 +1,43 @@
 """`KinDynComputations`: kinematics and dynamics of a robot as named `casadi.Function`s, each built once.
 
-Names and argument order are those of adam (`adam.casadi.KinDynComputations`).
+Names, arguments and their order are those of adam (`adam.casadi.KinDynComputations`).
 """
 
 from __future__ import annotations
 
-import os
-import re
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping
 from typing import Any
 
 import casadi as cs
-import numpy as np
-from numpy.typing import ArrayLike
 
-from multimodal_to.adam.centroidal import composite_inertias
-from multimodal_to.adam.quantities import Quantities
-from multimodal_to.adam.representation import Representations
-from multimodal_to.adam.spatial import SX
-from multimodal_to.adam.tree import Tree
-from multimodal_to.adam.urdf import load_tree
-from multimodal_to.errors import InputError, ModelError
-
-GRAVITY = (0.0, 0.0, -9.80665)
-"""Standard acceleration of free fall in world axes [m/s²]."""
+from multimodal_to.adam import aba, centroidal, coriolis, crba, kinematics, rnea
+from multimodal_to.adam.floating_base import FloatingBase, as_pose
+from multimodal_to.adam.kinematics import Chain
+from multimodal_to.adam.library import Library
+from multimodal_to.adam.quantity import of_frame, of_state, of_wrenches, quantity
+from multimodal_to.adam.representation import Representations, from_mixed, to_mixed_rate
+from multimodal_to.adam.spatial import homogeneous, symmetric
 
 
-_POSE = ("H", "s")
-_MOTION = ("H", "s", "v_b", "s_dot")
-_INVERSE = (*_MOTION, "v_b_dot", "s_ddot")
-_FORWARD = (*_MOTION, "tau")
-
-
-class KinDynComputations:
+class KinDynComputations(Library):
     """Rigid-body library of one floating-base robot.
 
     Every quantity comes as `name_fun()`, a named `casadi.Function` that is built on first use and kept, and as
-    `name(...)`, which checks the arguments and calls it with SX, MX, DM or numpy in.
+    `name(...)`, which checks the arguments and calls it with SX, MX, DM or numpy in. Arguments have the same names and
+    the same order in all of them; `quantity.ARGUMENTS` gives the symbol, shape, frame and unit of each.
 
-    Arguments, where they occur, in this order:
-
-    * `base_transform` (H): ``w_H_base``, (4, 4);
-    * `joint_positions` (s): (n, 1) [rad or m], in the order of `joint_names`;
-    * `base_velocity` (v_b): (6, 1), linear part first, in the chosen representation; mixed by default, which is (ṗ, ω)
-      of the base's origin in world axes;
-    * `joint_velocities` (s_dot): ṡ, (n, 1) [rad/s or m/s];
-    * `base_acceleration` (v_b_dot): the derivative of the six numbers v_b, and `joint_accelerations` (s_ddot): s̈.
-
-    ν = (v_b, ṡ). Frame velocities and Jacobians, forces and momenta are in the chosen representation too: forces are
-    dual to ν, momenta are about the CoM in the base's axes when body-fixed and in the world's otherwise. Positions and
-    velocities of the CoM are always in world axes.
+    ν = (v_b, ṡ), with v_b in the chosen representation; the default is the mixed one, (ṗ, ω) of the base's origin in
+    world axes. Frame velocities and Jacobians, forces and momenta are in that representation too: forces are dual to ν,
+    momenta are about the CoM, in the base's axes when body-fixed and in the world's otherwise. Positions and velocities
+    of the CoM are always in world axes.
 
     Args:
         urdfstring: path of a URDF, or its XML text (adam's name).
         joints_name_list: joints that move, in the order of s; by default all that can.
         root_link: the base, named as a check; a URDF has only one root.
         gravity: acceleration of free fall in world axes [m/s²]: three numbers, or six with adam's three zeros behind.
-        representation: how velocities are written.
+        f_opts: options of every `casadi.Function` that is built, for example `{"jit": True}`; none by default.
+        representation: how velocities are written, as a member of our `Representations` or of adam's.
         locked_joints: positions [rad or m] of movable joints left out of `joints_name_list`; zero by default.
 
     Raises:
@@ -65,220 +45,160 @@ class KinDynComputations:
         InputError: gravity is not three finite numbers, or the representation is unknown.
     """
 
-    def __init__(
-        self,
-        urdfstring: str | os.PathLike[str],
-        joints_name_list: Sequence[str] | None = None,
-        root_link: str | None = None,
-        gravity: ArrayLike = GRAVITY,
-        *,
-        representation: Representations = Representations.MIXED_REPRESENTATION,
-        locked_joints: Mapping[str, float] | None = None,
-    ) -> None:
-        self.tree: Tree = load_tree(urdfstring, joints_name_list, locked_joints)
-        if root_link not in (None, self.tree.base):
-            raise ModelError(f"the root link is '{self.tree.base}', not '{root_link}'")
-        self.gravity = _checked_gravity(gravity)
-        if representation not in tuple(Representations):
-            names = ", ".join(member.name for member in Representations)
-            raise InputError(f"unknown representation {representation!r}; available: {names}")
-        self.representation = Representations(representation)
-        self._quantities = Quantities(self.tree, cs.DM(self.gravity), self.representation)
-        self._functions: dict[str, cs.Function] = {}
-
-    # ---------------------------------------------------------------- the robot
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Return the joints in the order of s."""
-        return self.tree.joint_names
-
-    @property
-    def NDoF(self) -> int:
-        """Return the number of joints n (adam's name)."""
-        return len(self.tree.joints)
-
-    @property
-    def frame_names(self) -> tuple[str, ...]:
-        """Return the names of all frames: every link of the URDF."""
-        return tuple(self.tree.frames)
-
-    def get_total_mass(self) -> float:
-        """Return the total mass [kg]."""
-        return self.tree.total_mass
-
     # ---------------------------------------------------------------- frames
 
-    def forward_kinematics_fun(self, frame: str) -> cs.Function:
-        """Return (H, s) → w_H_frame, (4, 4)."""
-        build = self._quantities.forward_kinematics
-        return self._frame_function("forward_kinematics", frame, build, _POSE, "w_H_frame")
-
+    @quantity
     def forward_kinematics(self, frame: str, base_transform: Any, joint_positions: Any) -> Any:
         """Return w_H_frame, (4, 4)."""
-        return _call(self.forward_kinematics_fun(frame), base_transform, joint_positions)
+        pose = kinematics.forward_kinematics(
+            self.tree, self.tree.frame(frame), as_pose(base_transform), joint_positions
+        )
+        return homogeneous(pose.rotation, pose.translation)
 
-    def jacobian_fun(self, frame: str) -> cs.Function:
-        """Return (H, s) → J, (6, 6 + n): the frame's velocity is J ν."""
-        return self._frame_function("jacobian", frame, self._quantities.jacobian, _POSE, "J")
-
+    @quantity
     def jacobian(self, frame: str, base_transform: Any, joint_positions: Any) -> Any:
         """Return J, (6, 6 + n): the frame's velocity is J ν."""
-        return _call(self.jacobian_fun(frame), base_transform, joint_positions)
+        base = self._base(base_transform)
+        chain = Chain.to(self.tree, self.tree.frame(frame), base.pose, joint_positions)
+        jacobian = kinematics.geometric_jacobian(chain, self.NDoF)
+        return from_mixed(self.representation, chain.end) @ jacobian @ base.velocities()
 
-    def relative_jacobian_fun(self, frame: str) -> cs.Function:
-        """Return (s) → J, (6, n): the frame's velocity is J ṡ, with the base as the world."""
-        return self._frame_function("relative_jacobian", frame, self._quantities.relative_jacobian, ("s",), "J")
-
+    @quantity
     def relative_jacobian(self, frame: str, joint_positions: Any) -> Any:
         """Return J, (6, n): the frame's velocity is J ṡ, with the base as the world."""
-        return _call(self.relative_jacobian_fun(frame), joint_positions)
+        chain = Chain.to(self.tree, self.tree.frame(frame), as_pose(cs.SX.eye(4)), joint_positions)
+        return from_mixed(self.representation, chain.end) @ kinematics.geometric_jacobian(chain, self.NDoF)[:, 6:]
 
-    def jacobian_dot_fun(self, frame: str) -> cs.Function:
-        """Return (H, s, v_b, s_dot) → J̇, (6, 6 + n), along the motion."""
-        return self._frame_function("jacobian_dot", frame, self._quantities.jacobian_dot, _MOTION, "J_dot")
-
+    @quantity
     def jacobian_dot(
         self, frame: str, base_transform: Any, joint_positions: Any, base_velocity: Any, joint_velocities: Any
     ) -> Any:
-        """Return J̇, (6, 6 + n), along the motion."""
-        return _call(self.jacobian_dot_fun(frame), base_transform, joint_positions, base_velocity, joint_velocities)
+        """Return J̇, (6, 6 + n), along the motion: X_f⁻¹ (J̇ X + J Ẋ − Ẋ_f X_f⁻¹ J X) of the mixed J."""
+        base = self._base(base_transform)
+        chain, motions = base.chain(frame, joint_positions, base_velocity, joint_velocities)
+        twist = cs.vertcat(motions[-1].linear, motions[-1].angular)
+        out = from_mixed(self.representation, chain.end)
+        out_rate = to_mixed_rate(self.representation, chain.end, twist)
+        jacobian = kinematics.geometric_jacobian(chain, self.NDoF)
+        rate = kinematics.geometric_jacobian_rate(chain, motions, self.NDoF)
+        into, into_rate = base.velocities(), cs.diagcat(base.rate(base_velocity), cs.SX(self.NDoF, self.NDoF))
+        return out @ (rate @ into + jacobian @ into_rate - out_rate @ (out @ jacobian @ into))
 
-    def jacobian_dot_nu_fun(self, frame: str) -> cs.Function:
-        """Return (H, s, v_b, s_dot) → J̇ ν, (6, 1): the frame's acceleration while ν̇ = 0."""
-        return self._frame_function("jacobian_dot_nu", frame, self._quantities.jacobian_dot_nu, _MOTION, "J_dot_nu")
-
+    @quantity
     def jacobian_dot_nu(
         self, frame: str, base_transform: Any, joint_positions: Any, base_velocity: Any, joint_velocities: Any
     ) -> Any:
         """Return J̇ ν, (6, 1): the frame's acceleration while ν̇ = 0."""
-        return _call(self.jacobian_dot_nu_fun(frame), base_transform, joint_positions, base_velocity, joint_velocities)
+        base = self._base(base_transform)
+        chain, motions = base.chain(frame, joint_positions, base_velocity, joint_velocities)
+        end = motions[-1]
+        twist, rate = cs.vertcat(end.linear, end.angular), cs.vertcat(end.linear_rate, end.angular_rate)
+        out = from_mixed(self.representation, chain.end)
+        return out @ (rate - to_mixed_rate(self.representation, chain.end, twist) @ (out @ twist))
 
     # ---------------------------------------------------------------- centre of mass and momentum
 
-    def CoM_position_fun(self) -> cs.Function:
-        """Return (H, s) → x, (3, 1): the CoM in the world [m]."""
-        return self._function("CoM_position", self._quantities.com_position, _POSE, "CoM")
-
+    @quantity
     def CoM_position(self, base_transform: Any, joint_positions: Any) -> Any:
         """Return x, (3, 1): the CoM in the world [m]."""
-        return _call(self.CoM_position_fun(), base_transform, joint_positions)
+        return centroidal.com_position(self.tree, as_pose(base_transform), joint_positions)
 
-    def CoM_velocity_fun(self) -> cs.Function:
-        """Return (H, s, v_b, s_dot) → ẋ, (3, 1): the CoM's velocity in world axes [m/s]."""
-        return self._function("CoM_velocity", self._quantities.com_velocity, _MOTION, "v_CoM")
-
+    @quantity
     def CoM_velocity(self, base_transform: Any, joint_positions: Any, base_velocity: Any, joint_velocities: Any) -> Any:
         """Return ẋ, (3, 1): the CoM's velocity in world axes [m/s]."""
-        return _call(self.CoM_velocity_fun(), base_transform, joint_positions, base_velocity, joint_velocities)
+        base = self._base(base_transform)
+        twist = base.twist(base_velocity)
+        return base.world @ centroidal.com_velocity(self.tree, base.pose, joint_positions, twist, joint_velocities)
 
-    def CoM_jacobian_fun(self) -> cs.Function:
-        """Return (H, s) → J_CoM, (3, 6 + n): ẋ = J_CoM ν."""
-        return self._function("CoM_jacobian", self._quantities.com_jacobian, _POSE, "J_CoM")
-
+    @quantity
     def CoM_jacobian(self, base_transform: Any, joint_positions: Any) -> Any:
         """Return J_CoM, (3, 6 + n): ẋ = J_CoM ν."""
-        return _call(self.CoM_jacobian_fun(), base_transform, joint_positions)
+        base = self._base(base_transform)
+        return base.world @ crba.com_jacobian(self.tree, base.pose, joint_positions) @ base.velocities()
 
-    def centroidal_momentum_fun(self) -> cs.Function:
-        """Return (H, s, v_b, s_dot) → h = (m ẋ, hω), (6, 1), about the CoM, straight from the velocities."""
-        return self._function("centroidal_momentum", self._quantities.centroidal_momentum, _MOTION, "h")
-
+    @quantity
     def centroidal_momentum(
         self, base_transform: Any, joint_positions: Any, base_velocity: Any, joint_velocities: Any
     ) -> Any:
         """Return h = (m ẋ, hω), (6, 1), about the CoM, straight from the velocities."""
-        return _call(self.centroidal_momentum_fun(), base_transform, joint_positions, base_velocity, joint_velocities)
+        return self._base(base_transform).momentum(joint_positions, base_velocity, joint_velocities)
 
-    def centroidal_momentum_matrix_fun(self) -> cs.Function:
-        """Return (H, s) → J_CMM, (6, 6 + n): h = J_CMM ν."""
-        return self._function("centroidal_momentum_matrix", self._quantities.centroidal_momentum_matrix, _POSE, "J_CMM")
-
+    @quantity
     def centroidal_momentum_matrix(self, base_transform: Any, joint_positions: Any) -> Any:
         """Return J_CMM, (6, 6 + n): h = J_CMM ν."""
-        return _call(self.centroidal_momentum_matrix_fun(), base_transform, joint_positions)
+        base = self._base(base_transform)
+        return crba.centroidal_momentum_matrix(self.tree, base.pose, joint_positions) @ base.velocities()
 
-    def centroidal_momentum_bias_fun(self) -> cs.Function:
-        """Return (H, s, v_b, s_dot) → J̇_CMM ν, (6, 1): ḣ = J_CMM ν̇ + J̇_CMM ν."""
-        build = self._quantities.centroidal_momentum_bias
-        return self._function("centroidal_momentum_bias", build, _MOTION, "J_CMM_dot_nu")
-
+    @quantity
     def centroidal_momentum_bias(
         self, base_transform: Any, joint_positions: Any, base_velocity: Any, joint_velocities: Any
     ) -> Any:
         """Return J̇_CMM ν, (6, 1): ḣ = J_CMM ν̇ + J̇_CMM ν."""
-        return _call(
-            self.centroidal_momentum_bias_fun(), base_transform, joint_positions, base_velocity, joint_velocities
-        )
+        base, v, none = self._base(base_transform), base_velocity, cs.SX(self.NDoF, 1)
+        twist, acceleration = base.twist(v), base.rate(v) @ v
+        rate = rnea.momentum_rate(self.tree, base.pose, joint_positions, twist, joint_velocities, acceleration, none)
+        if self.representation is Representations.BODY_FIXED_REPRESENTATION:  # its axes turn with the base
+            momentum = base.momentum(joint_positions, v, joint_velocities)
+            rate -= cs.vertcat(cs.cross(v[3:], momentum[:3]), cs.cross(v[3:], momentum[3:]))
+        return rate
 
     # ---------------------------------------------------------------- dynamics
 
-    def mass_matrix_fun(self) -> cs.Function:
-        """Return (H, s) → M, (6 + n, 6 + n), by CRBA."""
-        return self._function("mass_matrix", self._quantities.mass_matrix, _POSE, "M")
-
+    @quantity
     def mass_matrix(self, base_transform: Any, joint_positions: Any) -> Any:
-        """Return M, (6 + n, 6 + n), by CRBA."""
-        return _call(self.mass_matrix_fun(), base_transform, joint_positions)
+        """Return M, (6 + n, 6 + n), by CRBA: Xᵀ M X of the mixed M."""
+        base = self._base(base_transform)
+        into = base.velocities()
+        return cs.sparsify(symmetric(into.T @ crba.mass_matrix(self.tree, base.pose, joint_positions) @ into))
 
-    def bias_force_fun(self) -> cs.Function:
-        """Return (H, s, v_b, s_dot) → C ν + G, (6 + n, 1), by RNEA."""
-        return self._function("bias_force", self._quantities.bias_force, _MOTION, "h")
+    @quantity
+    def coriolis_matrix(
+        self, base_transform: Any, joint_positions: Any, base_velocity: Any, joint_velocities: Any
+    ) -> Any:
+        """Return C, (6 + n, 6 + n), with Ṁ − 2 C skew-symmetric: Xᵀ (C X + M Ẋ) of the mixed C."""
+        base = self._base(base_transform)
+        into, twist = base.velocities(), base.twist(base_velocity)
+        matrix = coriolis.coriolis_matrix(self.tree, base.pose, joint_positions, twist, joint_velocities) @ into
+        if self.representation is not Representations.MIXED_REPRESENTATION:
+            rate = cs.horzcat(base.rate(base_velocity), cs.SX(6, self.NDoF))
+            matrix += crba.mass_matrix(self.tree, base.pose, joint_positions)[:, :6] @ rate
+        return cs.sparsify(into.T @ matrix)
 
+    @quantity
     def bias_force(self, base_transform: Any, joint_positions: Any, base_velocity: Any, joint_velocities: Any) -> Any:
         """Return C ν + G, (6 + n, 1), by RNEA."""
-        return _call(self.bias_force_fun(), base_transform, joint_positions, base_velocity, joint_velocities)
+        base = self._base(base_transform)
+        return base.forces(joint_positions, base_velocity, joint_velocities, gravity=cs.DM(self.gravity))
 
-    def coriolis_term_fun(self) -> cs.Function:
-        """Return (H, s, v_b, s_dot) → C ν, (6 + n, 1), by RNEA."""
-        return self._function("coriolis_term", self._quantities.coriolis_term, _MOTION, "C_nu")
-
+    @quantity
     def coriolis_term(
         self, base_transform: Any, joint_positions: Any, base_velocity: Any, joint_velocities: Any
     ) -> Any:
         """Return C ν, (6 + n, 1), by RNEA."""
-        return _call(self.coriolis_term_fun(), base_transform, joint_positions, base_velocity, joint_velocities)
+        base = self._base(base_transform)
+        return base.forces(joint_positions, base_velocity, joint_velocities, gravity=cs.DM(3, 1))
 
-    def coriolis_matrix_fun(self) -> cs.Function:
-        """Return (H, s, v_b, s_dot) → C, (6 + n, 6 + n), with Ṁ − 2 C skew-symmetric."""
-        return self._function("coriolis_matrix", self._quantities.coriolis_matrix, _MOTION, "C")
-
-    def coriolis_matrix(
-        self, base_transform: Any, joint_positions: Any, base_velocity: Any, joint_velocities: Any
-    ) -> Any:
-        """Return C, (6 + n, 6 + n), with Ṁ − 2 C skew-symmetric."""
-        return _call(self.coriolis_matrix_fun(), base_transform, joint_positions, base_velocity, joint_velocities)
-
-    def gravity_term_fun(self) -> cs.Function:
-        """Return (H, s) → G, (6 + n, 1): what holds the robot still."""
-        return self._function("gravity_term", self._quantities.gravity_term, _POSE, "G")
-
+    @quantity
     def gravity_term(self, base_transform: Any, joint_positions: Any) -> Any:
         """Return G, (6 + n, 1): what holds the robot still."""
-        return _call(self.gravity_term_fun(), base_transform, joint_positions)
+        return self._base(base_transform).forces(joint_positions, gravity=cs.DM(self.gravity))
 
-    def kinetic_energy_fun(self) -> cs.Function:
-        """Return (H, s, v_b, s_dot) → T = ½ νᵀ M ν [J]."""
-        return self._function("kinetic_energy", self._quantities.kinetic_energy, _MOTION, "T")
-
+    @quantity
     def kinetic_energy(
         self, base_transform: Any, joint_positions: Any, base_velocity: Any, joint_velocities: Any
     ) -> Any:
-        """Return T = ½ νᵀ M ν [J]."""
-        return _call(self.kinetic_energy_fun(), base_transform, joint_positions, base_velocity, joint_velocities)
+        """Return T = ½ νᵀ M ν [J], (1, 1)."""
+        base = self._base(base_transform)
+        twist = base.twist(base_velocity)
+        return centroidal.kinetic_energy(self.tree, base.pose, joint_positions, twist, joint_velocities)
 
-    def potential_energy_fun(self) -> cs.Function:
-        """Return (H, s) → V = −m g·x [J], zero where the CoM passes the world's origin."""
-        return self._function("potential_energy", self._quantities.potential_energy, _POSE, "V")
-
+    @quantity
     def potential_energy(self, base_transform: Any, joint_positions: Any) -> Any:
-        """Return V = −m g·x [J], zero where the CoM passes the world's origin."""
-        return _call(self.potential_energy_fun(), base_transform, joint_positions)
+        """Return V = −m g·x [J], (1, 1), zero where the CoM passes the world's origin."""
+        pose = as_pose(base_transform)
+        return centroidal.potential_energy(self.tree, pose, joint_positions, cs.DM(self.gravity))
 
-    def rnea_fun(self, frames: Sequence[str] = ()) -> cs.Function:
-        """Return (H, s, v_b, s_dot, v_b_dot, s_ddot, and the wrench on each of `frames`) → see `rnea`."""
-        return self._wrench_function("rnea", self._quantities.rnea, _INVERSE, frames, "tau")
-
+    @quantity
     def rnea(
         self,
         base_transform: Any,
@@ -294,20 +214,10 @@ class KinDynComputations:
         `external_wrenches` holds by frame name the (force, moment) that the world applies there, (6, 1), dual to the
         frame's velocity; mixed: at the frame's origin, in world axes.
         """
-        wrenches = dict(external_wrenches or {})
-        return _call(
-            self.rnea_fun(tuple(wrenches)), base_transform, joint_positions, base_velocity, joint_velocities,
-            base_acceleration, joint_accelerations, *wrenches.values(),
-        )  # fmt: skip
+        motion = joint_positions, base_velocity, joint_velocities, base_acceleration, joint_accelerations
+        return self._base(base_transform).forces(*motion, gravity=cs.DM(self.gravity), wrenches=external_wrenches)
 
-    def aba_fun(self, frames: Sequence[str] = ()) -> cs.Function:
-        """Return (H, s, v_b, s_dot, tau, and the wrench on each of `frames`) → ν̇; see `aba`.
-
-        Raises:
-            ModelError: a joint moves nothing that has mass, so that its acceleration is undefined.
-        """
-        return self._wrench_function("aba", self._aba, _FORWARD, frames, "nu_dot")
-
+    @quantity
     def aba(
         self,
         base_transform: Any,
@@ -322,71 +232,45 @@ class KinDynComputations:
         Raises:
             ModelError: a joint moves nothing that has mass, so that its acceleration is undefined.
         """
-        wrenches = dict(external_wrenches or {})
-        return _call(
-            self.aba_fun(tuple(wrenches)), base_transform, joint_positions, base_velocity, joint_velocities,
-            joint_torques, *wrenches.values(),
-        )  # fmt: skip
+        aba.refuse_massless_joints(self.tree)
+        base = self._base(base_transform)
+        acceleration = aba.forward_dynamics(
+            self.tree,
+            base.pose,
+            joint_positions,
+            base.twist(base_velocity),
+            joint_velocities,
+            joint_torques,
+            base.world.T @ cs.DM(self.gravity),
+            base.mixed_wrenches(joint_positions, external_wrenches),
+        )
+        v_dot = from_mixed(self.representation, base.pose) @ (
+            acceleration[:6] - base.rate(base_velocity) @ base_velocity
+        )
+        return cs.vertcat(v_dot, acceleration[6:])
 
-    # ---------------------------------------------------------------- how a Function is made
+    # ---------------------------------------------------------------- the function of each, and the name of its result
 
-    def _function(self, name: str, build: Callable[..., SX], inputs: Sequence[str], output: str) -> cs.Function:
-        if name not in self._functions:
-            n = self.NDoF
-            shapes = {"H": (4, 4), "s": (n, 1), "s_dot": (n, 1), "s_ddot": (n, 1), "tau": (n, 1)}
-            symbols = [cs.SX.sym(label, *shapes.get(label, (6, 1))) for label in inputs]
-            safe = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
-            self._functions[name] = cs.Function(safe, symbols, [cs.cse(build(*symbols))], list(inputs), [output])
-        return self._functions[name]
+    forward_kinematics_fun = of_frame(forward_kinematics, "w_H_frame")
+    jacobian_fun = of_frame(jacobian, "J")
+    relative_jacobian_fun = of_frame(relative_jacobian, "J")
+    jacobian_dot_fun = of_frame(jacobian_dot, "J_dot")
+    jacobian_dot_nu_fun = of_frame(jacobian_dot_nu, "J_dot_nu")
+    CoM_position_fun = of_state(CoM_position, "CoM")
+    CoM_velocity_fun = of_state(CoM_velocity, "v_CoM")
+    CoM_jacobian_fun = of_state(CoM_jacobian, "J_CoM")
+    centroidal_momentum_fun = of_state(centroidal_momentum, "h")
+    centroidal_momentum_matrix_fun = of_state(centroidal_momentum_matrix, "J_CMM")
+    centroidal_momentum_bias_fun = of_state(centroidal_momentum_bias, "J_CMM_dot_nu")
+    mass_matrix_fun = of_state(mass_matrix, "M")
+    coriolis_matrix_fun = of_state(coriolis_matrix, "C")
+    bias_force_fun = of_state(bias_force, "h")
+    coriolis_term_fun = of_state(coriolis_term, "C_nu")
+    gravity_term_fun = of_state(gravity_term, "G")
+    kinetic_energy_fun = of_state(kinetic_energy, "T")
+    potential_energy_fun = of_state(potential_energy, "V")
+    rnea_fun = of_wrenches(rnea, "tau")
+    aba_fun = of_wrenches(aba, "nu_dot")
 
-    def _frame_function(
-        self, name: str, frame: str, build: Callable[..., SX], inputs: Sequence[str], output: str
-    ) -> cs.Function:
-        self.tree.frame(frame)
-        return self._function(f"{name} {frame}", partial(build, frame), inputs, output)
-
-    def _wrench_function(
-        self, name: str, build: Callable[..., SX], inputs: Sequence[str], frames: Sequence[str], output: str
-    ) -> cs.Function:
-        for frame in frames:
-            self.tree.frame(frame)
-
-        def with_wrenches(*arguments: SX) -> SX:
-            return build(*arguments[: len(inputs)], dict(zip(frames, arguments[len(inputs) :], strict=True)))
-
-        wrenches = [f"w_{index}" for index, _ in enumerate(frames)]
-        return self._function(" ".join((name, *frames)), with_wrenches, (*inputs, *wrenches), output)
-
-    def _aba(self, *arguments: Any) -> SX:
-        """Return ABA's expression; refuse a joint that it would divide by nothing for."""
-        composites = composite_inertias(self.tree, cs.DM.ones(self.NDoF))
-        for body, composite in zip(self.tree.bodies[1:], composites[1:], strict=True):
-            moved = composite.mass if body.prismatic else composite.about_origin[2, 2]
-            if float(moved) <= 0:
-                raise ModelError(f"joint '{body.joint}' moves nothing that has mass, so its acceleration is undefined")
-        return self._quantities.aba(*arguments)
-
-
-def _checked_gravity(gravity: ArrayLike) -> np.ndarray:
-    vector = np.asarray(gravity, dtype=float).ravel()
-    if vector.shape == (6,) and not vector[3:].any():  # adam's form
-        vector = vector[:3]
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"gravity is {gravity!r}; expected three finite numbers, for example {GRAVITY}")
-    return vector
-
-
-def _call(function: cs.Function, *arguments: Any) -> Any:
-    """Call a function with every argument's shape and finiteness checked."""
-    return function(*(_checked(function, index, argument) for index, argument in enumerate(arguments)))
-
-
-def _checked(function: cs.Function, index: int, argument: Any) -> Any:
-    symbolic = isinstance(argument, cs.SX | cs.MX)
-    value = argument if symbolic or isinstance(argument, cs.DM) else np.asarray(argument, dtype=float)
-    expected, name = tuple(function.size_in(index)), function.name_in(index)
-    if tuple(value.shape) not in (expected, expected[:1] if expected[1] == 1 else expected):
-        raise InputError(f"{function.name()}: '{name}' has shape {tuple(value.shape)}; expected {expected}")
-    if not symbolic and not np.isfinite(np.asarray(value)).all():
-        raise InputError(f"{function.name()}: '{name}' holds values that are not finite")
-    return value
+    def _base(self, base_transform: Any) -> FloatingBase:
+        return FloatingBase.at(base_transform, self.tree, self.representation)

@@ -44,7 +44,13 @@ def joint_pose(body: Body, s: SX) -> Pose:
 
 
 def body_poses(tree: Tree, base: Pose, s: SX) -> list[Pose]:
-    """Return the pose of every body in whatever frame `base` is given in."""
+    """Return the pose of every body in whatever frame `base` is given in.
+
+    Args:
+        tree: the robot.
+        base: pose of the base in any frame; the result is in the same one.
+        s: joint positions, (n, 1) [rad or m].
+    """
     poses = [base]
     for body in tree.bodies[1:]:
         poses.append(poses[body.parent] @ joint_pose(body, s))
@@ -55,6 +61,11 @@ def frame_in_base(tree: Tree, frame: Frame, s: SX) -> Pose:
     """Return base_H_frame, multiplied from the frame to the base, so that the constant ends fold.
 
     Only y, z and p of the frame travel along the chain; x = y × z follows at its end.
+
+    Args:
+        tree: the robot.
+        frame: the frame, fixed in a body of the tree.
+        s: joint positions, (n, 1) [rad or m].
     """
     columns = cs.SX(cs.horzcat(frame.rotation[:, 1:], frame.translation))
     path = tree.path(frame.body)
@@ -66,7 +77,14 @@ def frame_in_base(tree: Tree, frame: Frame, s: SX) -> Pose:
 
 
 def forward_kinematics(tree: Tree, frame: Frame, base: Pose, s: SX) -> Pose:
-    """Return w_H_frame; the base's rotation has to be one, since x of the frame is taken as y × z."""
+    """Return w_H_frame; the base's rotation has to be one, since x of the frame is taken as y × z.
+
+    Args:
+        tree: the robot.
+        frame: the frame, fixed in a body of the tree.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+    """
     if frame.body == BASE:
         return base @ Pose(frame.rotation, frame.translation)
     seen = frame_in_base(tree, frame, s)
@@ -91,7 +109,14 @@ class Chain:
 
     @classmethod
     def to(cls, tree: Tree, frame: Frame, base: Pose, s: SX) -> Chain:
-        """Return the chain that ends in `frame`."""
+        """Return the chain that ends in `frame`.
+
+        Args:
+            tree: the robot.
+            frame: the frame, fixed in a body of the tree.
+            base: w_H_base, the pose of the base in the world.
+            s: joint positions, (n, 1) [rad or m].
+        """
         pose, bodies = base, []
         for index in tree.path(frame.body):
             pose = pose @ joint_pose(tree.bodies[index], s)
@@ -133,6 +158,11 @@ def chain_motions(chain: Chain, base: Motion, s_dot: SX) -> list[Motion]:
 
     With the arm r from one origin to the next: ṗ' = ṗ + ω × r, p̈' = p̈ + ω̇ × r + ω × (ω × r). A revolute joint adds
     a q̇ to ω and ω × a q̇ to ω̇, a prismatic one a q̇ to ṗ and 2 ω × a q̇ to p̈.
+
+    Args:
+        chain: the bodies from the base to a frame.
+        base: how the base moves, in world axes.
+        s_dot: joint velocities, (n, 1) [rad/s or m/s].
     """
     motions, origin = [base], chain.base.translation
     for body, pose in chain.bodies:
@@ -163,6 +193,11 @@ def geometric_jacobian_rate(chain: Chain, motions: list[Motion], n: int) -> SX:
     """Return J̇, (6, 6 + n), of the chain's end while it moves as `chain_motions` says.
 
     With ȧ_i = ω_i × a_i: (ȧ_i × (p_frame − p_i) + a_i × (ṗ_frame − ṗ_i), ȧ_i), and (ȧ_i, 0) when prismatic.
+
+    Args:
+        chain: the bodies from the base to a frame.
+        motions: of the base, of every body of the chain and of its end.
+        n: the number of joints.
     """
     end, last = chain.end.translation, motions[-1].linear
     rate = cs.SX(6, 6 + n)

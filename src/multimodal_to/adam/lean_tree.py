@@ -62,6 +62,12 @@ def build_tree(
     Every other joint that could move is held at its value in `locked` [rad or m], or at zero, or, when it mimics
     another, where that one holds it.
 
+    Args:
+        links: of the URDF.
+        joints: of the URDF.
+        moving: names of the joints that move, in the order of s.
+        locked: positions of other joints, by name [rad or m].
+
     Raises:
         ModelError: the links and joints form no tree with one root, a name is unknown or given twice, a joint that
             moves mimics another or is mimicked, or the masses are no robot's.
@@ -83,8 +89,9 @@ def build_tree(
             child_rotation = rotation @ joint.rotation
             child_translation = translation + rotation @ joint.translation
             if joint.name in columns:
-                child = _Draft(name=joint.child, parent=body, joint=joint, rotation=child_rotation,
-                               translation=child_translation)  # fmt: skip
+                child = _Draft(
+                    name=joint.child, parent=body, joint=joint, rotation=child_rotation, translation=child_translation
+                )
                 drafts[body].children.append(child)
                 drafts.append(child)
                 pending.append((joint.child, len(drafts) - 1, np.eye(3), np.zeros(3)))
@@ -213,7 +220,14 @@ def _inertia(link: Link) -> Inertia:
 def _displaced(
     joint: Joint, value: float, rotation: np.ndarray, translation: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the child's frame after the joint has moved from zero to `value` [rad or m]."""
+    """Return the child's frame after the joint has moved from zero to `value` [rad or m].
+
+    Args:
+        joint: the joint that moves.
+        value: its position [rad or m].
+        rotation: of the child's frame with the joint at zero, (3, 3).
+        translation: of the child's frame with the joint at zero, (3,) [m].
+    """
     if joint.kind == "prismatic":
         return rotation, translation + rotation @ joint.axis * value
     skew = np.array(cs.skew(cs.DM(joint.axis)))

@@ -14,12 +14,13 @@ Source: S. Traversaro, A. Saccon, "Multibody dynamics notation", TU Eindhoven, 2
 
 from __future__ import annotations
 
-from enum import IntEnum
+from enum import Enum, IntEnum
 
 import casadi as cs
 
 from multimodal_to.adam.kinematics import Pose
 from multimodal_to.adam.spatial import SX
+from multimodal_to.errors import InputError
 
 
 class Representations(IntEnum):
@@ -28,6 +29,19 @@ class Representations(IntEnum):
     BODY_FIXED_REPRESENTATION = 1
     MIXED_REPRESENTATION = 2
     INERTIAL_FIXED_REPRESENTATION = 3
+
+
+def checked_representation(representation: int) -> Representations:
+    """Return our member for `representation`: a member of ours or of adam's, or its value.
+
+    Raises:
+        InputError: there is no such value, or it belongs to a member of some enumeration that has another name.
+    """
+    names = Representations.__members__
+    known = representation in tuple(Representations)
+    if not known or (isinstance(representation, Enum) and representation.name not in names):
+        raise InputError(f"unknown representation {representation!r}; available: {', '.join(names)}")
+    return Representations(representation)
 
 
 def to_mixed(representation: Representations, pose: Pose) -> SX:
@@ -49,7 +63,13 @@ def from_mixed(representation: Representations, pose: Pose) -> SX:
 
 
 def to_mixed_rate(representation: Representations, pose: Pose, twist: SX) -> SX:
-    """Return Ẋ, (6, 6), of a frame at `pose` that moves with `twist` = (ṗ, ω)."""
+    """Return Ẋ, (6, 6), of a frame at `pose` that moves with `twist` = (ṗ, ω).
+
+    Args:
+        representation: how the frame's velocity is written.
+        pose: of the frame in the world.
+        twist: (ṗ, ω) of the frame in world axes, (6, 1) [m/s, rad/s].
+    """
     if representation is Representations.BODY_FIXED_REPRESENTATION:
         turning = cs.skew(twist[3:]) @ pose.rotation
         return cs.diagcat(turning, turning)

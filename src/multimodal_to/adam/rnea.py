@@ -32,12 +32,12 @@ def inverse_dynamics(
 
     Args:
         tree: the robot.
-        base: pose of the base in the world.
-        s: joint positions.
-        base_twist: (ṗ, ω) of the base in world axes.
-        s_dot: joint velocities.
-        base_acceleration: (p̈, ω̇) of the base in world axes.
-        s_ddot: joint accelerations.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+        base_twist: (ṗ, ω) of the base in world axes, (6, 1) [m/s, rad/s].
+        s_dot: joint velocities, (n, 1) [rad/s or m/s].
+        base_acceleration: (p̈, ω̇) of the base in world axes, (6, 1) [m/s², rad/s²].
+        s_ddot: joint accelerations, (n, 1) [rad/s² or m/s²].
         gravity: acceleration of free fall in world axes [m/s²], (3, 1).
         wrenches: by frame name, the (force, moment) that the world applies there, at the frame's origin, world axes.
     """
@@ -85,7 +85,17 @@ def inverse_dynamics(
 
 
 def momentum_rate(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX, base_acceleration: SX, s_ddot: SX) -> SX:
-    """Return ḣ about the CoM in world axes, (6, 1): the base's wrench of RNEA without gravity, moved to the CoM."""
+    """Return ḣ about the CoM in world axes, (6, 1): the base's wrench of RNEA without gravity, moved to the CoM.
+
+    Args:
+        tree: the robot.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+        base_twist: (ṗ, ω) of the base in world axes, (6, 1) [m/s, rad/s].
+        s_dot: joint velocities, (n, 1) [rad/s or m/s].
+        base_acceleration: (p̈, ω̇) of the base in world axes, (6, 1) [m/s², rad/s²].
+        s_ddot: joint accelerations, (n, 1) [rad/s² or m/s²].
+    """
     wrench = inverse_dynamics(tree, base, s, base_twist, s_dot, base_acceleration, s_ddot, cs.DM.zeros(3, 1))
     arm = base.rotation @ com_in_base(tree, s)
     return cs.vertcat(wrench[:3], wrench[3:6] - cs.cross(arm, wrench[:3]))
@@ -103,7 +113,14 @@ def _turning(omega: SX, alpha: SX) -> SX:
 
 
 def applied_wrenches(tree: Tree, base: Pose, s: SX, wrenches: Mapping[str, SX]) -> list[SX]:
-    """Return the wrench (force, moment) on each body at its own origin, in its own axes, (6, 1) each."""
+    """Return the wrench (force, moment) on each body at its own origin, in its own axes, (6, 1) each.
+
+    Args:
+        tree: the robot.
+        base: w_H_base, the pose of the base in the world.
+        s: joint positions, (n, 1) [rad or m].
+        wrenches: by frame name, (force, moment) at the frame's origin in world axes, (6, 1) [N, N m].
+    """
     applied = [cs.SX(6, 1) for _ in tree.bodies]
     poses = body_poses(tree, base, s) if wrenches else []
     for name, wrench in wrenches.items():

@@ -26,11 +26,13 @@ def rotation_about_z(cosine: SX, sine: SX) -> SX:
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
     """Return R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3), angles in rad: URDF's convention."""
     (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
-    return np.array([
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ])  # fmt: skip
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
 
 
 def symmetric(matrix: SX) -> SX:

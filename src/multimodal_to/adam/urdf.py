@@ -79,9 +79,16 @@ def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
     text, source = _read(urdf)
     try:
         # Entities are not expanded and nothing is fetched: a URDF from elsewhere is only text.
-        root = etree.fromstring(text, etree.XMLParser(
-            resolve_entities=False, load_dtd=False, no_network=True, remove_comments=True, remove_pis=True,
-        ))  # fmt: skip
+        root = etree.fromstring(
+            text,
+            etree.XMLParser(
+                resolve_entities=False,
+                load_dtd=False,
+                no_network=True,
+                remove_comments=True,
+                remove_pis=True,
+            ),
+        )
     except (etree.XMLSyntaxError, ValueError) as error:
         if b"<!DOCTYPE" in text:  # whose entities the parser has stumbled over
             raise ModelError(f"{source} {_ENTITIES}") from error
@@ -103,9 +110,12 @@ def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
     logger.setLevel(logging.CRITICAL)  # it logs what is reported here
     try:
         return yourdfpy.URDF.load(
-            io.BytesIO(etree.tostring(root)), build_scene_graph=False, load_meshes=False,
-            build_collision_scene_graph=False, load_collision_meshes=False,
-        ).robot  # fmt: skip
+            io.BytesIO(etree.tostring(root)),
+            build_scene_graph=False,
+            load_meshes=False,
+            build_collision_scene_graph=False,
+            load_collision_meshes=False,
+        ).robot
     except Exception as error:  # yourdfpy raises whatever its parsing runs into
         raise ModelError(f"{source} is no URDF that can be read: {error}") from error
     finally:
@@ -125,9 +135,15 @@ _USED_WITHIN = {"link": ("inertial", "visual"), "joint": ("parent", "child", "or
 _NEEDED = {"link": ("name",), "joint": ("name", "type")}
 _NEEDED_IN_JOINT = {"parent": "link", "child": "link"}
 _NEEDED_WITHIN = {
-    "mass": ("value",), "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "axis": ("xyz",), "mimic": ("joint",),
-    "box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "mesh": ("filename",),
-}  # fmt: skip
+    "mass": ("value",),
+    "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+    "axis": ("xyz",),
+    "mimic": ("joint",),
+    "box": ("size",),
+    "cylinder": ("radius", "length"),
+    "sphere": ("radius",),
+    "mesh": ("filename",),
+}
 _SHAPES = ("box", "cylinder", "sphere", "mesh")
 
 
@@ -173,12 +189,18 @@ def _refuse_missing(root: Any, source: str) -> None:
 
 
 _COUNTS: Mapping[str, Mapping[str, tuple[int, ...]]] = {
-    "origin": {"xyz": (3,), "rpy": (3,)}, "axis": {"xyz": (3,)}, "mass": {"value": (1,)},
-    "inertia": dict.fromkeys(_NEEDED_WITHIN["inertia"], (1,)), "mimic": {"multiplier": (1,), "offset": (1,)},
+    "origin": {"xyz": (3,), "rpy": (3,)},
+    "axis": {"xyz": (3,)},
+    "mass": {"value": (1,)},
+    "inertia": dict.fromkeys(_NEEDED_WITHIN["inertia"], (1,)),
+    "mimic": {"multiplier": (1,), "offset": (1,)},
     "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), (1,)),
-    "box": {"size": (3,)}, "cylinder": {"radius": (1,), "length": (1,)}, "sphere": {"radius": (1,)},
-    "mesh": {"scale": (1, 3)}, "color": {"rgba": (3, 4)},
-}  # fmt: skip
+    "box": {"size": (3,)},
+    "cylinder": {"radius": (1,), "length": (1,)},
+    "sphere": {"radius": (1,)},
+    "mesh": {"scale": (1, 3)},
+    "color": {"rgba": (3, 4)},
+}
 """How many numbers the attributes of each element hold."""
 
 
@@ -236,9 +258,17 @@ def _joint(joint: Any) -> Joint:
         axis = given / length
     limits, unlimited = _limits(joint)
     return Joint(
-        name=joint.name, kind=joint.type, parent=joint.parent, child=joint.child, rotation=origin[:3, :3],
-        translation=origin[:3, 3], axis=axis, mimic=_mimic(joint), remarks=(*remarks, *unlimited), **limits,
-    )  # fmt: skip
+        name=joint.name,
+        kind=joint.type,
+        parent=joint.parent,
+        child=joint.child,
+        rotation=origin[:3, :3],
+        translation=origin[:3, 3],
+        axis=axis,
+        mimic=_mimic(joint),
+        remarks=(*remarks, *unlimited),
+        **limits,
+    )
 
 
 def _limits(joint: Any) -> tuple[dict[str, float], tuple[str, ...]]:

@@ -25,6 +25,7 @@ from multimodal_to.scenarios.data import stored
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import LOADED, flight_phases, generalised_forces, surface_frames
+from multimodal_to.trajectory.sameness import refuse_other_robot
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,13 +68,7 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
     Raises:
         InputError: the trajectory is for another robot, or the scenario allows more of a property that is not judged.
     """
-    for label, here, there in (
-        ("joints", robot.joint_names, trajectory.joint_names),
-        ("contact points", robot.contact_names, trajectory.contact_names),
-        ("jets", robot.jet_names, trajectory.jet_names),
-    ):
-        if here != there:
-            raise InputError(f"the {label} of the trajectory are {there}; those of {robot.name} are {here}")
+    refuse_other_robot(trajectory, robot)
     scenario = scenario or stored(trajectory)
     phases = flight_phases(trajectory)
     motion = Motion.of(robot, trajectory)

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from multimodal_to.auditing.audit import Audit
 from multimodal_to.cli.completion import robots_or_folders, scenarios_or_files
-from multimodal_to.errors import InputError, OutputError, TrajectoryError, listed
+from multimodal_to.errors import InputError, OutputError, TrajectoryError
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.scenarios import find
 from multimodal_to.scenarios.files import change, load
@@ -21,6 +21,7 @@ from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.archive import read_archive
 from multimodal_to.trajectory.importing import import_arrays
+from multimodal_to.trajectory.sameness import refuse_other_robot
 
 app = typer.Typer(
     name="multimodal-to",
@@ -70,15 +71,7 @@ def loaded(file: Path, robot: str) -> tuple[Robot, Trajectory]:
             "--robot"
         )
     the_robot = load_robot(robot or trajectory.robot).with_jets(trajectory.jet_names)
-    for label, here, there in (
-        ("joints", the_robot.joint_names, trajectory.joint_names),
-        ("contact points", the_robot.contact_names, trajectory.contact_names),
-    ):
-        if here != there:
-            raise TrajectoryError(
-                f"'{file}' is for another robot: its {label} are {listed(there)}; those of {the_robot.name} are "
-                f"{listed(here)}"
-            )
+    refuse_other_robot(trajectory, the_robot, what=f"'{file}'", of=("joints", "contact points"), error=TrajectoryError)
     return the_robot, trajectory
 
 

@@ -38,9 +38,10 @@ def audit_file(
 
     Example: multimodal-to audit results/take-off/trajectory.npz
     """
-    report = audit(*loaded(file, robot))
+    the_robot, trajectory = loaded(file, robot)
+    report, unusual = audit(the_robot, trajectory), trajectory.unusual_formulation()
     if as_json:
-        typer.echo(json.dumps(_as_data(report), indent=2, ensure_ascii=False))
+        typer.echo(json.dumps({**_as_data(report), "formulation": unusual}, indent=2, ensure_ascii=False))
         raise typer.Exit(0 if report.holds else 1)
     narrow = [Column(title, no_wrap=True) for title in ("property", "worst", "limit", "unit", "knot")]
     table = Table(*narrow, "where", Column(no_wrap=True), box=None, pad_edge=False)
@@ -63,6 +64,8 @@ def audit_file(
             "the friction as the robot's own pyramid",
             soft_wrap=True,
         )
+    if unusual:
+        out.print(f"the problem had {unusual}; the audit does not judge these", soft_wrap=True)
     raise typer.Exit(0 if report.holds else 1)
 
 

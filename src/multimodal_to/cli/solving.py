@@ -44,7 +44,7 @@ from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
 from multimodal_to.trajectory import Trajectory
 
-_MISSES_SHOWN = 5
+_VIOLATIONS_SHOWN = 5
 
 
 @app.command("list")
@@ -86,9 +86,12 @@ def show(
 
     Example: multimodal-to show take-off > my_task.toml
     """
-    scenario = stored(Trajectory.load(name)) if name.endswith(".npz") else chosen(name, None)
+    trajectory = Trajectory.load(name) if name.endswith(".npz") else None
+    scenario = chosen(name, None) if trajectory is None else stored(trajectory)
     if scenario is None:
         raise ScenarioError(f"'{name}' keeps no scenario")
+    if trajectory is not None and (unusual := trajectory.unusual_formulation()):
+        out.print(f"# the problem had {unusual}; a scenario does not hold these", soft_wrap=True)
     out.print(to_toml(change(scenario, settings or ())), soft_wrap=True, end="")
 
 
@@ -246,8 +249,8 @@ def _explain(console: Console, relaxation: Relaxation) -> None:
         console.print(f"explain: found nothing for certain in {spent}: {relaxation.status.value}", soft_wrap=True)
     elif not relaxation.gives_way:
         console.print(f"explain: nothing has to give way, all rows can be met together ({spent})", soft_wrap=True)
-    for miss in relaxation.gives_way:
-        console.print(f"explain: gives way: {miss}", soft_wrap=True)
+    for some in relaxation.gives_way:
+        console.print(f"explain: gives way: {some}", soft_wrap=True)
 
 
 def _draw(robot: Robot, trajectory: Trajectory, folder: Path) -> list[Path]:
@@ -270,8 +273,8 @@ def _summarise(console: Console, solution: Solution, report: Audit) -> None:
     if not solution.status.solved:
         feasible = "feasible" if solution.feasible else "not feasible"
         console.print(f"the trajectory is the best iterate, of iteration {solution.iteration}: {feasible}")
-        for miss in solution.misses[:_MISSES_SHOWN]:
-            console.print(f"missed: {miss}", soft_wrap=True)
+        for some in solution.unmet[:_VIOLATIONS_SHOWN]:
+            console.print(f"not met: {some}", soft_wrap=True)
     failed = [finding for finding in report.findings if not finding.holds]
     for finding in failed:
         console.print(

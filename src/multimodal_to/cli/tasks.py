@@ -41,6 +41,11 @@ def given(
     if warm_start is not None:
         raise InputError("--resume and --warm-start both say what to start from; expected one of them")
     start = Trajectory.load(resume)
+    if unusual := start.unusual_formulation():
+        raise InputError(
+            f"'{resume}' is of a problem that this command does not have ({unusual}); go on from it in the script that "
+            "makes these terms, with solve(problem, start=Trajectory.load(...))"
+        )
     scenario = stored(start)
     if scenario is None:
         raise ScenarioError(f"'{resume}' keeps no scenario to go on with; name one and start from it by --warm-start")

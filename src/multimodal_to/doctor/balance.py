@@ -14,7 +14,7 @@ from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.guess import base_transform, contact_positions
-from multimodal_to.ocp.variables import Knot
+from multimodal_to.ocp.knot import Knot
 
 LONG_LEVER = 100.0
 """A lever far longer than any robot [m]: forces are met first, and what is left over is a moment if it can be one."""
@@ -57,12 +57,13 @@ def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, lever:
             wanted.
     """
     lever = lever_of(task.robot) if lever is None else lever
-    robot, world = task.robot, replace(task.world, friction_cone=FrictionCone.PYRAMID)
+    robot, scenario = task.robot, replace(task.scenario, friction_cone=FrictionCone.PYRAMID)
+    parameters = replace(task.parameters, scenario=scenario)
     forces = cs.SX.sym("f", 3 * len(robot.contacts))
     thrust = cs.SX.sym("T", len(robot.jets))
     knot = knot_of(task, posture, forces, thrust)
-    balance = constraints.static_equilibrium(knot, world).expression
-    cone = constraints.friction_cone(knot, world).expression
+    balance = constraints.static_equilibrium(knot, parameters)
+    cone = constraints.friction_cone(knot, parameters)
     free = cs.vertcat(forces, thrust)
     rows = cs.Function("rows", [free], [cs.vertcat(balance, cone), cs.jacobian(cs.vertcat(balance, cone), free)])
     offset, matrix = (np.array(part) for part in rows(np.zeros(free.shape[0])))

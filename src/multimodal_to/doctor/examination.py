@@ -15,6 +15,7 @@ from multimodal_to.doctor.travel import leap, push, speed
 from multimodal_to.doctor.weighing import allowances, costs, groups, scales
 from multimodal_to.errors import MultimodalError
 from multimodal_to.models.robot import Robot
+from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.scenarios.scenario import Scenario
 
 Check = Callable[[Task], Iterator[Symptom]]
@@ -39,13 +40,18 @@ ONCE_SOUND: tuple[Check, ...] = (formulation,)
 """What is asked of a task in which the others found no error: it needs a problem that can be made."""
 
 
-def doctor(robot: Robot, scenario: Scenario) -> Diagnosis:
+def doctor(robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> Diagnosis:
     """Return what can be said of a task before its problem is built and solved, in about a second.
 
     An error is certain, or as certain as what `build` refuses: no motion does what is asked. Nothing is raised for a
     task that makes no sense; it is an error among the findings.
+
+    Args:
+        robot: whose motion it is.
+        scenario: the task.
+        formulation: what the problem is made of; by default `Formulation.paper()`.
     """
-    task = Task.of(robot, scenario)
+    task = Task.of(robot, scenario, formulation)
     if not robot.contacts:
         return refusal("contacts", f"{robot.name} has no contact points to stand on", "name some in its robot.toml")
     findings = [finding for check in CHECKS for finding in check(task)]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.task import Task
-from multimodal_to.errors import MultimodalError
-from multimodal_to.ocp.problem import formulate
+from multimodal_to.errors import FormulationError, MultimodalError, listed
+from multimodal_to.ocp.problem import Outline, formulate
 from multimodal_to.ocp.stages import NamedStage
 from multimodal_to.ocp.variables import Bounds, Layout
 from multimodal_to.trajectory import QUANTITIES, labels
@@ -22,16 +22,20 @@ _INTEGRATION = "_integration"  # what the names of rows end with that tie a vari
 def formulation(task: Task) -> Iterator[Symptom]:
     """Look for bounds that contradict each other and for variables that nothing asks for."""
     try:
-        layout, bounds, stages = formulate(task.robot, task.scenario, task.posture)
+        outline = formulate(task.robot, task.scenario, task.posture, task.formulation)
+    except FormulationError as cause:
+        yield error("terms", str(cause), "change the term, or leave it out")
+        return
     except MultimodalError as cause:
         yield error("boundary", str(cause), "let start and end lie within the ranges of scenario and robot")
         return
-    yield from _crossed(task, bounds)
-    yield from _unseen(task, layout, bounds, stages)
+    yield from _crossed(task, outline)
+    yield from _unseen(task, outline.layout, outline.bounds, outline.stages)
 
 
-def _crossed(task: Task, bounds: Bounds) -> Iterator[Symptom]:
+def _crossed(task: Task, outline: Outline) -> Iterator[Symptom]:
     """Name the first bound of each variable whose least value is above its greatest."""
+    bounds = outline.bounds
     for name in bounds.lower:
         crossed = np.argwhere(bounds.lower[name] > bounds.upper[name] + 1e-9)
         if not crossed.size:
@@ -39,11 +43,13 @@ def _crossed(task: Task, bounds: Bounds) -> Iterator[Symptom]:
         row, knot = crossed[0]
         least, greatest = bounds.lower[name][row, knot], bounds.upper[name][row, knot]
         middle = name == "com_position" and knot == task.scenario.knots // 2
+        terms = outline.terms_that_hold(name, int(row), int(knot))
+        either = "widen the one or the other" + (f"; the term {listed(terms)} holds it there" if terms else "")
         yield error(
             "bounds",
             f"{name} ({labels(name, task.robot)[row]}) has to be at least {least:.6g} and at most {greatest:.6g} "
             f"{QUANTITIES[name].unit} at knot {knot}",
-            "lower mid_height_min or widen com_range" if middle else "widen the one or the other",
+            "lower mid_height_min or widen com_range" if middle and not terms else either,
         )
 
 

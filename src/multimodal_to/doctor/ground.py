@@ -14,10 +14,11 @@ from multimodal_to.doctor.search import search
 from multimodal_to.doctor.task import Task
 from multimodal_to.models.robot import Posture
 from multimodal_to.models.terrain import FlatGround, frame_function
-from multimodal_to.ocp import constraints
-from multimodal_to.ocp.constraints import Rows, World
+from multimodal_to.ocp import paper
 from multimodal_to.ocp.guess import contact_positions
-from multimodal_to.ocp.variables import Knot
+from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.ocp.terms import Constraint, equal
 from multimodal_to.scenarios.scenario import Vector3
 
 
@@ -40,7 +41,7 @@ def height(task: Task) -> Iterator[Symptom]:
     elif isinstance(scenario.surface, FlatGround):
         above = scenario.final_com[2] - scenario.surface.height
         reach = task.robot.contact_reach[2]
-        if above > reach:
+        if task.held(paper.CONTACT_REACH) and above > reach:
             yield error(
                 "standing end",
                 f"the CoM has to end {above:.3g} m above the feet, beyond the reach of contact "
@@ -66,15 +67,24 @@ def _other_height(task: Task, which: str) -> str:
 def _nearest_height(task: Task, com: Vector3) -> float | None:
     """Return the height of the CoM nearest to that of `com` [m] that the robot can stand at, if a search finds it."""
 
-    def across(knot: Knot, world: World) -> Rows:
-        return Rows(expression=knot.com_position[:2] - cs.DM(com[:2]), lower=0.0, upper=0.0, unit="m")
+    def across(knot: Knot, parameters: Parameters) -> cs.SX:
+        return knot.com_position[:2] - cs.DM(com[:2])
 
     def off(knot: Knot) -> cs.SX:
         away = cs.sumsqr(knot.joint_positions - task.robot.home.joint_positions)
         return 1e3 * (knot.com_position[2] - com[2]) ** 2 + 1e-3 * away
 
-    rows = (across, constraints.standing_height, constraints.contact_reach)
-    found = search(task, task.robot.home, com, rows=rows, objective=off, thrusts=np.zeros(len(task.robot.jets)))
+    found = search(
+        task,
+        task.robot.home,
+        com,
+        constraints=(
+            Constraint(value=across, within=equal(), unit="m"),
+            *task.held(paper.STANDING_HEIGHT, paper.CONTACT_REACH),
+        ),
+        objective=off,
+        thrusts=np.zeros(len(task.robot.jets)),
+    )
     return None if found is None else float(com_of(task, found)[2])
 
 
@@ -95,7 +105,7 @@ def _held(task: Task, when: str, posture: Posture, thrusts: np.ndarray, certain:
         return
     sliding = residual(task, posture, feet=True, thrusts=thrusts, lever=math.inf)
     if not sliding.nothing:
-        friction = task.world.friction
+        friction = task.parameters.friction
         yield (error if certain else warning)(
             f"friction at the {when}",
             f"the ground under the feet is inclined by up to {_steepest(task, posture):.1f}°, and friction, "

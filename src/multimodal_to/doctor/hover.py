@@ -15,21 +15,22 @@ from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
 from multimodal_to.doctor.search import search
 from multimodal_to.doctor.task import Task
 from multimodal_to.models.robot import Posture
-from multimodal_to.ocp import constraints
-from multimodal_to.ocp.constraints import Rows, World
-from multimodal_to.ocp.variables import Knot
+from multimodal_to.ocp import paper
+from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.ocp.terms import Constraint, equal
 from multimodal_to.scenarios.scenario import Vector3
 
 _UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 _SLACK = 2e-2
 """Share of the weight that a base within its tolerance of upright, and what force contacts may keep, cannot make up."""
-_ROWS = (
-    constraints.static_equilibrium,
-    constraints.non_penetration,
-    constraints.contact_reach,
-    constraints.jet_reach,
+_HOVER = (
+    paper.STATIC_EQUILIBRIUM,
+    paper.NON_PENETRATION,
+    paper.CONTACT_REACH,
+    paper.JET_REACH,
 )
-"""The problem's own rows of a knot that hovers, beside those that thrusts within their limits and no force fulfil."""
+"""Constraints of a knot that hovers, beside those that thrusts within their limits and no force fulfil."""
 
 
 def trim(task: Task) -> Iterator[Symptom]:
@@ -86,10 +87,11 @@ def trimmed(task: Task, com: Vector3) -> Posture | None:
     """
     start = upright(task)
 
-    def there(knot: Knot, world: World) -> Rows:
-        return Rows(expression=knot.com_position - cs.DM(com), lower=0.0, upper=0.0, unit="m")
+    def there(knot: Knot, parameters: Parameters) -> cs.SX:
+        return knot.com_position - cs.DM(com)
 
     def away(knot: Knot) -> cs.SX:
         return cs.sumsqr(knot.joint_positions - start.joint_positions)
 
-    return search(task, start, com, rows=(there, *_ROWS), objective=away, thrusts=task.thrusts_held)
+    asked = (Constraint(value=there, within=equal(), unit="m"), *task.held(*_HOVER))
+    return search(task, start, com, constraints=asked, objective=away, thrusts=task.thrusts_held)

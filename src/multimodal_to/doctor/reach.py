@@ -11,8 +11,8 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.doctor.balance import knot_of
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.task import Task
-from multimodal_to.ocp import constraints
-from multimodal_to.ocp.constraints import KnotRows
+from multimodal_to.ocp import paper
+from multimodal_to.ocp.terms import Constraint
 
 _TOLERANCE = 1e-6  # [1]
 
@@ -21,14 +21,19 @@ def reach(task: Task) -> Iterator[Symptom]:
     """Hold contact points and jets, in the posture that the problem is built around, to their reach from the CoM."""
     robot = task.robot
     jets = tuple(f"the jet {name}" for name in robot.jet_names)
-    yield from _beyond(task, constraints.contact_reach, robot.contact_names, robot.contact_reach, "contacts")
-    yield from _beyond(task, constraints.jet_reach, jets, robot.jet_reach, "jets")
+    for term, names, limits, key in (
+        (paper.CONTACT_REACH, robot.contact_names, robot.contact_reach, "contacts"),
+        (paper.JET_REACH, jets, robot.jet_reach, "jets"),
+    ):
+        if task.held(term):
+            yield from _beyond(task, term, names, limits, key)
 
 
-def _beyond(task: Task, rows: KnotRows, names: tuple[str, ...], limits: Array, key: str) -> Iterator[Symptom]:
+def _beyond(task: Task, term: Constraint, names: tuple[str, ...], limits: Array, key: str) -> Iterator[Symptom]:
     robot = task.robot
     knot = knot_of(task, task.posture, cs.SX.zeros(3 * len(robot.contacts)), cs.SX.zeros(len(robot.jets)))
-    arms = np.abs(np.array(cs.evalf(rows(knot, task.world).expression))).reshape(-1, 3)  # as fractions of the reach
+
+    arms = np.abs(np.array(cs.evalf(term.rows(knot, task.parameters).expression))).reshape(-1, 3)
     if arms.max(initial=0.0) <= 1 + _TOLERANCE:
         return
     point, axis = np.unravel_index(int(arms.argmax()), arms.shape)

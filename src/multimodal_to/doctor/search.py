@@ -13,8 +13,8 @@ from multimodal_to.adam.spatial import SX, Array
 from multimodal_to.doctor.balance import com_of, knot_of
 from multimodal_to.doctor.task import Task
 from multimodal_to.models.robot import Posture
-from multimodal_to.ocp.constraints import KnotRows
-from multimodal_to.ocp.variables import Knot
+from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.terms import Constraint
 from multimodal_to.scenarios.scenario import Vector3
 
 
@@ -23,11 +23,11 @@ def search(
     start: Posture,
     com: Vector3,
     *,
-    rows: Sequence[KnotRows],
+    constraints: Sequence[Constraint],
     objective: Callable[[Knot], SX],
     thrusts: Array,
 ) -> Posture | None:
-    """Return the posture with the least objective that fulfils rows at rest without contact forces, if one is found.
+    """Return the posture with the least objective at rest, without contact forces and within constraints, if found.
 
     The base keeps its orientation; its position, joints and thrusts are free. Solved by IPOPT, from one start: none
     found is no proof that there is none.
@@ -36,7 +36,7 @@ def search(
         task: robot and scenario.
         start: posture to begin from, moved to where its CoM is at `com`.
         com: [m].
-        rows: the problem's own, of a knot.
+        constraints: of a knot.
         objective: of a knot.
         thrusts: the greatest of each jet [N], (jets,); begun from in equal shares that carry the weight.
     """
@@ -53,8 +53,8 @@ def search(
         com_position=centroidal.com_position(robot.kindyn.tree, posed.base, joints),
         contact_positions=cs.vertcat(*(posed.pose(name).translation for name in robot.contact_names)),
     )
-    world = task.world
-    asked = [function(knot, world) for function in rows]
+    parameters = task.parameters
+    asked = [term.rows(knot, parameters) for term in constraints]
     variables = cs.vertcat(position, joints, thrust)
     if sum(some.expression.shape[0] for some in asked if some.lower == some.upper) > variables.shape[0]:
         return None  # more equations than unknowns, as for a robot with few joints

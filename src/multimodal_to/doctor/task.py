@@ -12,22 +12,26 @@ from multimodal_to.doctor.turbines import greatest_held
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import FlatGround, Plane
-from multimodal_to.ocp.constraints import World
+from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.guess import standing_posture
+from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.ocp.terms import Constraint
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Task:
-    """A scenario for a robot with the jets that it uses."""
+    """A scenario for a robot with the jets that it uses, and what its problem is made of."""
 
     robot: Robot
     scenario: Scenario
+    formulation: Formulation
 
     @classmethod
-    def of(cls, robot: Robot, scenario: Scenario) -> Task:
+    def of(cls, robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> Task:
         """Return a scenario for a robot, whose jets are left out if the scenario leaves them off."""
-        return cls(robot=robot if scenario.jets else robot.with_jets(()), scenario=scenario)
+        robot = robot if scenario.jets else robot.with_jets(())
+        return cls(robot=robot, scenario=scenario, formulation=formulation or Formulation.paper())
 
     # ---------------------------------------------------------------- time
 
@@ -96,9 +100,13 @@ class Task:
         return self.start_posture or self.end_posture or self.robot.home
 
     @property
-    def world(self) -> World:
-        """Return what the problem's rows may ask for."""
-        return World.of(self.robot, self.scenario, self.posture)
+    def parameters(self) -> Parameters:
+        """Return what the problem's terms may read."""
+        return Parameters.of(self.robot, self.scenario, self.posture)
+
+    def held(self, *constraints: Constraint) -> tuple[Constraint, ...]:
+        """Return those of some constraints that the formulation has."""
+        return tuple(term for term in constraints if term in self.formulation.terms)
 
     @property
     def rigid(self) -> bool:

@@ -53,7 +53,7 @@ def push(task: Task) -> Iterator[Symptom]:
     if robot.jets or not isinstance(scenario.surface, FlatGround) or not (task.stands_at_start and task.stands_at_end):
         return
     way = np.abs(np.subtract(scenario.final_com, scenario.initial_com))[:2]
-    moving, step, friction = task.moving_intervals, scenario.interval_max, task.world.friction
+    moving, step, friction = task.moving_intervals, scenario.interval_max, task.parameters.friction
     gravity = robot.weight / robot.mass
     furthest = friction * gravity * (moving + 1) * moving * step**2 / 2
     if way.max() > furthest:

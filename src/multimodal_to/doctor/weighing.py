@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import fields
+from collections.abc import Iterator
 
 import numpy as np
 
 from multimodal_to.auditing import check_allowances
 from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
 from multimodal_to.doctor.task import Task
-from multimodal_to.errors import InputError, ModelError
-from multimodal_to.ocp.variables import INTERVAL_SCALE, SCALES
-from multimodal_to.scenarios.scenario import Weights
-from multimodal_to.solving.solvers import Ipopt
+from multimodal_to.errors import FormulationError, InputError, ModelError
+from multimodal_to.solving.ipopt import Ipopt
+from multimodal_to.trajectory import QUANTITIES
 
 _FAINT = Ipopt().tolerance ** 2
 """Share of the greatest cost below which one is lost: costs are squares, and the solver stops at its tolerance."""
@@ -52,8 +50,14 @@ def allowances(task: Task) -> Iterator[Symptom]:
 
 
 def costs(task: Task) -> Iterator[Symptom]:
-    """Compare costs, weight × size² in the solver's units, with each other and with what the solver gets on with."""
-    sizes = dict(_sizes(task.scenario.weights))
+    """Compare costs, weight × scale² of their residuals, with each other and with what the solver gets on with."""
+    try:
+        sizes = _sizes(task)
+    except FormulationError as cause:
+        yield error("weights", str(cause), "change the term, or leave it out")
+        return
+    except ModelError:  # a group that does not exist, which `groups` names
+        return
     if not task.robot.jets:
         idle = [name for name in _JETS if sizes.pop(name, 0.0)]
         if idle and task.scenario.jets:
@@ -72,7 +76,7 @@ def costs(task: Task) -> Iterator[Symptom]:
                 "weights",
                 f"at the size that the solver takes for one, {name} costs {size:.1e} and {greatest} "
                 f"{sizes[greatest]:.1e}: the objective cannot see the smaller",
-                f"raise weights.{name} or lower weights.{greatest}",
+                f"raise the weight of {name} or lower that of {greatest}",
             )
     scaled = Ipopt().objective_scale * sizes[greatest]
     if not _OBJECTIVE[0] <= scaled <= _OBJECTIVE[1]:
@@ -84,29 +88,41 @@ def costs(task: Task) -> Iterator[Symptom]:
         )
 
 
-def _sizes(weights: Weights) -> Iterator[tuple[str, float]]:
-    for entry in fields(weights):
-        value = getattr(weights, entry.name)
-        heaviest = max(value.values(), default=0.0) if isinstance(value, Mapping) else value
-        if heaviest:
-            variable = {"contact_force_rates": "contact_forces"}.get(entry.name, entry.name)
-            yield entry.name, float(heaviest) * SCALES.get(variable, 1.0) ** 2
+def _sizes(task: Task) -> dict[str, float]:
+    """Return weight × scale² of each cost that has a weight, by name."""
+    parameters = task.parameters
+    sizes = {}
+    for term in task.formulation.costs:
+        if term.when is None or term.when(parameters):
+            heaviest = float(np.max(term.weights(parameters), initial=0.0))
+            if heaviest:
+                sizes[term.name] = heaviest * term.scale**2
+    return sizes
 
 
 def scales(task: Task) -> Iterator[Symptom]:
     """Compare what the robot's variables will be with the sizes that the solver takes for one."""
     robot, scenario = task.robot, task.scenario
+    known = {variable.name: variable.scale for variable in task.formulation.variables}
     expected = {
-        "contact_forces": (robot.weight / len(robot.contacts), SCALES["contact_forces"], "N"),
-        "com_position": (float(np.abs([scenario.initial_com, scenario.final_com]).max()), SCALES["com_position"], "m"),
-        "interval": (scenario.interval_max, INTERVAL_SCALE, "s"),
+        "contact_forces": robot.weight / len(robot.contacts),
+        "com_position": float(np.abs([scenario.initial_com, scenario.final_com]).max()),
     }
     if robot.jets and task.hovers:
-        expected["thrust"] = robot.weight / len(robot.jets), SCALES["thrust"], "N"
-    for name, (size, scale, unit) in expected.items():
-        if size and not 1 / _OFF <= size / scale <= _OFF:
-            yield warning(
-                "scales",
-                f"{name} will be about {size:.2g} {unit}, and the solver takes {scale:g} {unit} for one",
-                "change SCALES or INTERVAL_SCALE in ocp/variables.py for a robot or a task of this size",
-            )
+        expected["thrust"] = robot.weight / len(robot.jets)
+    for name, size in expected.items():
+        unit = QUANTITIES[name].unit
+        yield from _off(name, size, known[name], unit, f"Formulation.paper().with_scales({{'{name}': {size:.1g}}})")
+    interval = scenario.interval_max
+    change = f"replace(Formulation.paper(), interval_scale={interval:.1g})"
+    yield from _off("interval", interval, task.formulation.interval_scale, "s", change)
+
+
+def _off(name: str, size: float, scale: float, unit: str, change: str) -> Iterator[Symptom]:
+    """Compare a variable's size with its scale, both in its unit, and say what to change."""
+    if size and not 1 / _OFF <= size / scale <= _OFF:
+        yield warning(
+            "scales",
+            f"{name} will be about {size:.2g} {unit}, and the solver takes {scale:g} {unit} for one",
+            f"build with formulation={change}",
+        )

@@ -62,6 +62,9 @@ def friction_cone(surface: Surface, point: SX, force: SX, friction: float) -> SX
 
 
 FRICTION = {FrictionCone.PYRAMID: friction_pyramid, FrictionCone.SECOND_ORDER: friction_cone}
+"""The rows of each kind of cone."""
+FACES = {FrictionCone.PYRAMID: ("+x", "+y", "-x", "-y"), FrictionCone.SECOND_ORDER: ("normal", "cone")}
+"""What the rows of each kind are called: the pyramid's by the way along the ground in which the force is too large."""
 
 
 def complementarity(surface: Surface, point: SX, force: SX) -> SX:

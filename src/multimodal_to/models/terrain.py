@@ -89,7 +89,7 @@ class Relief(ABC):
         return self.frame(point)[2]
 
 
-class Remembered:
+class CachedSurface:
     """A surface that makes the expressions of each point once, however many rows ask for them."""
 
     def __init__(self, surface: Surface) -> None:

@@ -1,5 +1,30 @@
-"""The optimal control problem: variables, constraints and costs, their transcription, and the start guess."""
+"""What is asked: variables, terms, the integration rule, and the problem that they make."""
 
+from multimodal_to.ocp.formulation import Formulation
+from multimodal_to.ocp.integration import BackwardEuler, IntegrationRule, Interval
+from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.problem import Problem, build, precompile
+from multimodal_to.ocp.terms import Constraint, Cost, Where, Within, at_least, at_most, between, equal
+from multimodal_to.ocp.variables import Variable
 
-__all__ = ["Problem", "build", "precompile"]
+__all__ = [
+    "BackwardEuler",
+    "Constraint",
+    "Cost",
+    "Formulation",
+    "IntegrationRule",
+    "Interval",
+    "Knot",
+    "Parameters",
+    "Problem",
+    "Variable",
+    "Where",
+    "Within",
+    "at_least",
+    "at_most",
+    "between",
+    "build",
+    "equal",
+    "precompile",
+]

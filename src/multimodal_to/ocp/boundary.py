@@ -1,36 +1,13 @@
-"""How a motion starts and ends: bounds at the first and last knots, and the rows that only they have."""
+"""How a motion starts and ends: bounds of the variables at the first and last knots."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from multimodal_to.models.robot import Posture, Robot
-from multimodal_to.ocp import constraints
-from multimodal_to.ocp.constraints import KnotRows
 from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.variables import Bounds
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
-
-START_ROWS: dict[Start, tuple[KnotRows, ...]] = {
-    Start.STANDING: (constraints.friction_cone, constraints.static_equilibrium),
-    Start.HOVER: (
-        constraints.unit_quaternion,
-        constraints.com_kinematics,
-        constraints.contact_kinematics,
-        constraints.non_penetration,
-        constraints.friction_cone,
-        constraints.static_equilibrium,
-        constraints.steady_thrust,
-    ),
-}
-"""Rows of the first knot: a standing posture is given, and only its forces are found; a hovering one is found too."""
-
-END_ROWS: dict[Terminal, tuple[KnotRows, ...]] = {
-    Terminal.HOVER: (),
-    Terminal.STANDING: (constraints.standing_height,),
-    Terminal.FREE: (),
-}
-"""Rows of the last knot beside those of every knot."""
 
 _AT_REST = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
 _NO_FORCE = 0.01

@@ -1,113 +1,77 @@
-"""The costs, one residual function each; its name is the name of its weight and of its share in the report.
-
-A cost is weight × |residual|² (× Δt when running).
-"""
+"""The paper's costs as residuals; `paper.py` says where each is charged and which weight of the scenario it has."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import casadi as cs
 
 from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import SX
-from multimodal_to.ocp.constraints import World
-from multimodal_to.ocp.variables import Knot
-
-Residual = Callable[[Knot, Knot, SX, World], SX]
-"""A function of an interval's start and end knot, Δt and the world."""
+from multimodal_to.ocp.integration import Interval
+from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.parameters import Parameters
 
 
-def com_velocity(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+def com_velocity(knot: Knot, parameters: Parameters) -> SX:
     """ẋ."""
-    return end.com_velocity
+    return knot.com_velocity
 
 
-def com_acceleration(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+def com_acceleration(interval: Interval, parameters: Parameters) -> SX:
     """ẍ = (ẋ⁺ − ẋ) / Δt."""
-    return (end.com_velocity - start.com_velocity) / dt
+    return interval.rate(lambda knot: knot.com_velocity)
 
 
-def angular_momentum(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+def angular_momentum(knot: Knot, parameters: Parameters) -> SX:
     """hω."""
-    return end.angular_momentum
+    return knot.angular_momentum
 
 
-def angular_momentum_rate(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+def angular_momentum_rate(interval: Interval, parameters: Parameters) -> SX:
     """ḣω = (hω⁺ − hω) / Δt."""
-    return (end.angular_momentum - start.angular_momentum) / dt
+    return interval.rate(lambda knot: knot.angular_momentum)
 
 
-def base_acceleration(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+def base_acceleration(interval: Interval, parameters: Parameters) -> SX:
     """v̇ = (v⁺ − v) / Δt of the base's twist v = (ṗ, ω)."""
-    return (
-        cs.vertcat(
-            end.base_linear_velocity - start.base_linear_velocity,
-            end.base_angular_velocity - start.base_angular_velocity,
-        )
-        / dt
-    )
+    return interval.rate(lambda knot: cs.vertcat(knot.base_linear_velocity, knot.base_angular_velocity))
 
 
-def joint_velocities(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+def joint_velocities(knot: Knot, parameters: Parameters) -> SX:
     """ṡ."""
-    return end.joint_velocities
+    return knot.joint_velocities
 
 
-def posture(start: Knot, end: Knot, dt: SX, world: World) -> SX:
-    """s − s̄, with the posture in which the robot stands as s̄ (`World.standing`)."""
-    return end.joint_positions - cs.DM(world.standing.joint_positions)
+def posture(knot: Knot, parameters: Parameters) -> SX:
+    """s − s̄, with the posture in which the robot stands as s̄ (`Parameters.standing`)."""
+    return knot.joint_positions - cs.DM(parameters.standing.joint_positions)
 
 
-def initial_posture(start: Knot, end: Knot, dt: SX, world: World) -> SX:
-    """s − s̄ at the interval's start."""
-    return start.joint_positions - cs.DM(world.standing.joint_positions)
-
-
-def base_orientation(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+def base_orientation(knot: Knot, parameters: Parameters) -> SX:
     """Vector part of ρ ∘ ρ̄⁻¹, half the angle from the home orientation ρ̄ for small ones."""
-    home = quaternion.conjugate(cs.DM(world.robot.home.base_quaternion_xyzw))
-    return quaternion.product(end.base_quaternion_xyzw, home)[:3]
+    home = quaternion.conjugate(cs.DM(parameters.robot.home.base_quaternion_xyzw))
+    return quaternion.product(knot.base_quaternion_xyzw, home)[:3]
 
 
-def contact_forces(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+def contact_forces(knot: Knot, parameters: Parameters) -> SX:
     """f."""
-    return end.contact_forces
+    return knot.contact_forces
 
 
-def contact_force_rates(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+def contact_force_rates(interval: Interval, parameters: Parameters) -> SX:
     """ḟ = (f⁺ − f) / Δt."""
-    return (end.contact_forces - start.contact_forces) / dt
+    return interval.rate(lambda knot: knot.contact_forces)
 
 
-def thrust(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+def thrust(knot: Knot, parameters: Parameters) -> SX:
     """T."""
-    return end.thrust
+    return knot.thrust
 
 
-def thrust_rate(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+def thrust_rate(knot: Knot, parameters: Parameters) -> SX:
     """Ṫ."""
-    return end.thrust_rate
+    return knot.thrust_rate
 
 
-def throttle(start: Knot, end: Knot, dt: SX, world: World) -> SX:
+def throttle(knot: Knot, parameters: Parameters) -> SX:
     """u."""
-    return end.throttle
-
-
-RUNNING: tuple[Residual, ...] = (
-    com_velocity,
-    com_acceleration,
-    angular_momentum,
-    angular_momentum_rate,
-    base_acceleration,
-    joint_velocities,
-    posture,
-    base_orientation,
-    contact_forces,
-    contact_force_rates,
-    thrust,
-    thrust_rate,
-    throttle,
-)
-FINAL: tuple[Residual, ...] = (posture, com_velocity, com_acceleration, angular_momentum, angular_momentum_rate)
+    return knot.throttle

@@ -96,14 +96,13 @@ def base_transform(posture: Posture) -> Array:
     return posture.base_transform
 
 
-def start_guess(robot: Robot, scenario: Scenario, standing: Posture) -> Array:
+def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Layout) -> Array:
     """Return the start guess of every knot, (layout size, N + 1), in the variables' own units.
 
     The standing posture moves with the CoM on the straight line from start to end. The contact points go along in x and
     y, or step `guess_steps` times. Contact forces carry the weight; a motion that starts in the air hands it over to
     them linearly from the thrusts, one that walks into the air the other way round. Everything else is zero.
     """
-    layout = Layout.of(robot)
     knots = scenario.knots + 1
     start, end = np.array(scenario.initial_com), np.array(scenario.final_com)
     travelled = (end - start)[:, None] * np.linspace(0.0, 1.0, knots)

@@ -1,48 +1,23 @@
-"""The stages of a scenario: which named rows and costs hold at the first knot, over every interval, and at the end."""
+"""The stages of a problem: which named rows and costs hold at the first knot, over every interval, and at the end."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
-from multimodal_to.adam.spatial import SX, Array
-from multimodal_to.models.robot import Robot
-from multimodal_to.ocp import constraints, costs
-from multimodal_to.ocp.boundary import END_ROWS, START_ROWS
-from multimodal_to.ocp.constraints import IntervalRows, KnotRows, Rows, World
-from multimodal_to.ocp.naming import components
+from multimodal_to.adam.spatial import SX
+from multimodal_to.ocp.formulation import Formulation
+from multimodal_to.ocp.integration import Interval
+from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.ocp.terms import Constraint, Cost, Rows, Where
 from multimodal_to.ocp.transcription import Stage
-from multimodal_to.ocp.variables import INTERVAL_SCALE, Bounds, Knot, Layout
-from multimodal_to.scenarios.scenario import Scenario, Weights
-
-AT_KNOTS: tuple[KnotRows, ...] = (
-    constraints.com_kinematics,
-    constraints.angular_momentum_kinematics,
-    constraints.contact_kinematics,
-    constraints.non_penetration,
-    constraints.friction_cone,
-    constraints.complementarity,
-    constraints.contact_reach,
-    constraints.jet_reach,
-)
-"""Rows of every knot but the first."""
-
-OVER_INTERVALS: tuple[IntervalRows, ...] = (
-    constraints.momentum_dynamics,
-    constraints.com_integration,
-    constraints.base_position_integration,
-    constraints.base_orientation_integration,
-    constraints.joint_integration,
-    constraints.thrust_integration,
-    constraints.thrust_dynamics,
-    constraints.sliding,
-)
-"""Rows of every interval."""
+from multimodal_to.ocp.variables import Bounds, Layout
+from multimodal_to.scenarios.scenario import Start
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,115 +30,179 @@ class NamedStage:
     cost_names: tuple[str, ...]
 
 
-def collect(world: World, scenario: Scenario, layout: Layout, bounds: Bounds) -> list[NamedStage]:
-    """Return the stages of a scenario; rows of a single variable go into `bounds` instead."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Held:
+    """A row of a term that is a single variable: slope × z + constant, with z in solver units.
+
+    It becomes a bound of that variable, which costs the solver nothing; its name stays.
+    """
+
+    term: str
+    variable: str  # name of the variable
+    row: int  # which of that variable's rows
+    knots: NDArray[np.int64]
+    component: str
+    unit: str
+    slope: float  # own unit per solver unit of the variable
+    lower: float  # of z, in solver units
+    upper: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Place:
+    """What terms are given in a stage, for each place that it has."""
+
+    name: str
+    at: Mapping[Where, Knot | Interval]
+    variables: SX  # that its knot rows may be bounds of
+    starts: NDArray[np.int64]  # the first knot of each interval
+    knots: NDArray[np.int64]  # that its knot rows are of
+
+
+def collect(
+    formulation: Formulation, parameters: Parameters, layout: Layout, bounds: Bounds
+) -> tuple[list[NamedStage], list[Held]]:
+    """Return the stages of a problem, and the rows that became bounds of a variable instead.
+
+    Args:
+        formulation: its terms and its rule.
+        parameters: what the terms may read.
+        layout: of the variables of a knot.
+        bounds: of every variable at every knot; they are tightened by the rows that are a single variable.
+
+    Raises:
+        FormulationError: a term does not return what it has to.
+    """
+    knots = parameters.scenario.knots
     z, z_next, dt = cs.SX.sym("z", layout.size), cs.SX.sym("z_next", layout.size), cs.SX.sym("dt")
-    start, end = (Knot(world.robot, **layout.read(values * layout.scale)) for values in (z, z_next))
-    interval = dt * INTERVAL_SCALE
-    first, every, last = np.array([0]), np.arange(scenario.knots), np.array([scenario.knots - 1])
-
-    at_start = _named(START_ROWS[scenario.start], start, world)
-    at_knots = _named(AT_KNOTS, end, world)
-    at_end = _named(END_ROWS[scenario.terminal], end, world)
-    over_intervals = _named(OVER_INTERVALS, start, end, interval, world)
-    rows = {
-        "first": _move_to_bounds(at_start, z, layout, bounds, first),
-        "every": _move_to_bounds(at_knots, z_next, layout, bounds, every + 1) + over_intervals,
-        "last": _move_to_bounds(at_end, z_next, layout, bounds, last + 1),
-    }
-    charged = _costs(start, end, interval, world, scenario.weights)
-    return [
-        NamedStage(
-            stage=Stage(
-                name=name,
-                starts=starts,
-                start=z,
-                end=z_next,
-                interval=dt,
-                families=tuple(some.expression / some.scale for _, some in rows[name]),
-                costs=cs.vertcat(cs.SX(0, 1), *charged[name].values()),
-            ),
-            rows=rows[name],
-            knots=starts if name == "first" else starts + 1,
-            cost_names=tuple(charged[name]),
+    start, end = (Knot(parameters.robot, **layout.read(values * layout.scale)) for values in (z, z_next))
+    duration = dt * formulation.interval_scale
+    interval = Interval(start, end, duration, formulation.rule)
+    first, every, last = np.array([0]), np.arange(knots), np.array([knots - 1])
+    found = parameters.scenario.start is Start.HOVER  # the first knot's posture is found
+    places = (
+        _Place(
+            name="first",
+            at={Where.FIRST_KNOT: start} | ({Where.EVERY_KNOT: start} if found else {}),
+            variables=z,
+            starts=first,
+            knots=first,
+        ),
+        _Place(
+            name="every",
+            at={Where.LATER_KNOTS: end, Where.EVERY_KNOT: end, Where.EVERY_INTERVAL: interval},
+            variables=z_next,
+            starts=every,
+            knots=every + 1,
+        ),
+        _Place(
+            name="last",
+            at={Where.LAST_KNOT: end, Where.LAST_INTERVAL: interval},
+            variables=z_next,
+            starts=last,
+            knots=last + 1,
+        ),
+    )
+    stages, held = list[NamedStage](), list[Held]()
+    for place in places:
+        rows = list[tuple[str, Rows]]()
+        for name, some in _rows(formulation.constraints, place, parameters):
+            left, bound = _without_bounds(name, some, place, layout)
+            held += bound
+            if left.expression.shape[0]:
+                rows.append((name, left))
+        charged = _charges(formulation.costs, place, parameters, duration)
+        if not (rows or charged):
+            continue
+        stages.append(
+            NamedStage(
+                stage=Stage(
+                    name=place.name,
+                    starts=place.starts,
+                    start=z,
+                    end=z_next,
+                    interval=dt,
+                    families=tuple(some.expression / some.scale for _, some in rows),
+                    costs=cs.vertcat(cs.SX(0, 1), *charged.values()),
+                ),
+                rows=rows,
+                knots=place.knots,
+                cost_names=tuple(charged),
+            )
         )
-        for name, starts in {"first": first, "every": every, "last": last}.items()
-        if rows[name] or charged[name]
-    ]
+    for some_bound in held:
+        _tighten(bounds, layout, some_bound)
+    return stages, held
 
 
-def _named(functions: Sequence[Callable[..., Rows]], *arguments: Any) -> list[tuple[str, Rows]]:
-    """Return the rows of each function with its name; a robot without jets has none of theirs."""
-    rows = [(function.__name__, function(*arguments)) for function in functions]
-    robot = arguments[-1].robot  # of the world
-    return [
-        (name, replace(some, components=components(robot, some.of, some.expression.shape[0])))
-        for name, some in rows
-        if some.expression.shape[0]
-    ]
+def _rows(constraints: Sequence[Constraint], place: _Place, parameters: Parameters) -> list[tuple[str, Rows]]:
+    """Return the rows of a place by name; a robot without jets has none of theirs."""
+    found = []
+    for term in constraints:
+        if term.when is None or term.when(parameters):
+            rows = [term.rows(at, parameters) for at in _at(term, place)]
+            found += [(term.name, some) for some in rows if some.expression.shape[0]]
+    return found
 
 
-def _move_to_bounds(
-    named: list[tuple[str, Rows]], z: SX, layout: Layout, bounds: Bounds, knots: NDArray[np.int64]
-) -> list[tuple[str, Rows]]:
-    """Turn rows that are a single variable, up to a constant, into its bounds at `knots`; return the others."""
-    left = []
-    for label, rows in named:
-        jacobian, kept, names = cs.sparsify(cs.jacobian(rows.expression, z)), [cs.SX(0, 1)], list[str]()
-        for index in range(rows.expression.shape[0]):
-            entry, row = rows.expression[index], jacobian[index, :]
-            if row.nnz() != 1 or not row.nonzeros()[0].is_constant():
-                kept.append(entry)
-                names.append(rows.components[index])
-                continue
-            slope = float(row.nonzeros()[0])
-            constant = float(cs.substitute(entry, z, cs.DM.zeros(z.shape[0])))
-            low, high = sorted((limit - constant) / slope for limit in (rows.lower, rows.upper))
-            _tighten(bounds, layout, row.sparsity().get_col()[0], low, high, knots)
-        if sum(entry.shape[0] for entry in kept):
-            left.append((label, replace(rows, expression=cs.vertcat(*kept), components=tuple(names))))
-    return left
+def _charges(costs: Sequence[Cost], place: _Place, parameters: Parameters, duration: SX) -> dict[str, SX]:
+    """Return the weighted costs of a place by name; those of zero weight are left out."""
+    charged = {}
+    for term in costs:
+        if (term.when is not None and not term.when(parameters)) or not np.any(term.weights(parameters)):
+            continue
+        for at in _at(term, place):
+            amount = term.charge(at, parameters)
+            charged[term.name] = amount * duration if term.per_second else amount
+    return charged
 
 
-def _tighten(bounds: Bounds, layout: Layout, column: int, lower: float, upper: float, knots: NDArray[np.int64]) -> None:
-    name = next(name for name, rows in layout.rows.items() if rows.start <= column < rows.stop)
-    row, scale = column - layout.rows[name].start, layout.scale[column]
-    bounds.lower[name][row, knots] = np.maximum(bounds.lower[name][row, knots], lower * scale)
-    bounds.upper[name][row, knots] = np.minimum(bounds.upper[name][row, knots], upper * scale)
+def _at(term: Constraint | Cost, place: _Place) -> list[Knot | Interval]:
+    """Return what a term is given in a place, if it is there: once, even where two of its own names mean the same."""
+    return [place.at[where] for where in term.places if where in place.at][:1]
 
 
-def _costs(start: Knot, end: Knot, dt: SX, world: World, weights: Weights) -> dict[str, dict[str, SX]]:
-    """Return the weighted costs by stage and name; those of zero weight are left out."""
-    every: dict[str, SX] = {}
-    for residual in costs.RUNNING:
-        weight = _weight(residual.__name__, world.robot, weights)
-        if np.any(weight):
-            every[residual.__name__] = _weighted_square(weight, residual(start, end, dt, world)) * dt
-    last: dict[str, SX] = {}
-    for residual in costs.FINAL:
-        name = f"final_{residual.__name__}"
-        weight = _weight(name, world.robot, weights)
-        if np.any(weight):
-            last[name] = _weighted_square(weight, residual(start, end, dt, world))
-    first: dict[str, SX] = {}
-    if weights.contact_forces:
-        first["contact_forces"] = _weighted_square(weights.contact_forces, start.contact_forces) * dt
-    if weights.initial_posture:
-        residual = costs.initial_posture(start, end, dt, world)
-        first["initial_posture"] = _weighted_square(weights.initial_posture, residual)
-    return {"first": first, "every": every, "last": last}
+def _without_bounds(name: str, rows: Rows, place: _Place, layout: Layout) -> tuple[Rows, list[Held]]:
+    """Split rows into those that remain and those that are a single variable, up to a constant."""
+    jacobian = cs.sparsify(cs.jacobian(rows.expression, place.variables))
+    kept, held = list[int](), list[Held]()
+    for index in range(rows.expression.shape[0]):
+        entry, slopes = rows.expression[index], jacobian[index, :]
+        single = slopes.nnz() == 1 and slopes.nonzeros()[0].is_constant()
+        if not single or not cs.symvar(entry) or len(cs.symvar(entry)) > 1:
+            kept.append(index)
+            continue
+        slope = float(slopes.nonzeros()[0])
+        constant = float(cs.substitute(entry, place.variables, cs.DM.zeros(place.variables.shape[0])))
+        low, high = sorted((limit - constant) / slope for limit in (rows.lower, rows.upper))
+        column = slopes.sparsity().get_col()[0]
+        variable = next(key for key, span in layout.rows.items() if span.start <= column < span.stop)
+        held.append(
+            Held(
+                term=name,
+                variable=variable,
+                row=column - layout.rows[variable].start,
+                knots=place.knots,
+                component=rows.components[index],
+                unit=rows.units[index],
+                slope=abs(slope),
+                lower=low,
+                upper=high,
+            )
+        )
+    if not held:
+        return rows, held
+    left = replace(
+        rows,
+        expression=cs.vertcat(cs.SX(0, 1), *(rows.expression[index] for index in kept)),
+        units=tuple(rows.units[index] for index in kept),
+        components=tuple(rows.components[index] for index in kept),
+    )
+    return left, held
 
 
-def _weight(name: str, robot: Robot, weights: Weights) -> float | Array:
-    """Return a cost's weight: one number, or one per joint for a weight by joint group."""
-    value = getattr(weights, name)
-    if isinstance(value, int | float):
-        return float(value)
-    by_joint = np.zeros(len(robot.joint_names))
-    for group, weight in value.items():
-        by_joint[robot.group_indices(group)] = weight
-    return by_joint
-
-
-def _weighted_square(weight: float | Array, residual: SX) -> SX:
-    return cs.dot(cs.DM(weight) * residual, residual)
+def _tighten(bounds: Bounds, layout: Layout, held: Held) -> None:
+    scale: float = layout.scale[layout.rows[held.variable].start + held.row]
+    lower, upper = bounds.lower[held.variable], bounds.upper[held.variable]
+    lower[held.row, held.knots] = np.maximum(lower[held.row, held.knots], held.lower * scale)
+    upper[held.row, held.knots] = np.minimum(upper[held.row, held.knots], held.upper * scale)

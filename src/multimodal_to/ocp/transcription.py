@@ -78,6 +78,10 @@ class Stage:
         """Return (z, z⁺, Δt) → nonzeros of the gradient of all costs, and their places."""
         return self._nonzeros("gradient", cs.sparsify(cs.gradient(cs.sum1(self.costs), self._arguments)))
 
+    def cost_gradient(self, index: int) -> cs.Function:
+        """Return (z, z⁺, Δt) → the whole gradient of one cost."""
+        return self._function(f"cost_gradient_{index}", cs.gradient(self.costs[index], self._arguments))
+
     def hessian(self) -> tuple[cs.Function, cs.Sparsity]:
         """Return (z, z⁺, Δt, σ, λ) → nonzeros of the upper Hessian of σ Σ costs + λᵀ rows, and their places."""
         sigma, multipliers = cs.SX.sym("sigma"), cs.SX.sym("lambda", self.rows.shape[0])

@@ -2,42 +2,60 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
-import casadi as cs
 import numpy as np
 
-from multimodal_to.adam import quaternion
-from multimodal_to.adam.kinematics import Pose, forward_kinematics
-from multimodal_to.adam.spatial import SX, Array
-from multimodal_to.errors import ScenarioError
+from multimodal_to.adam.spatial import Array
+from multimodal_to.errors import FormulationError, ScenarioError, unknown
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import QUANTITIES
 
-SCALES = {
-    "com_position": 1.0,
-    "com_velocity": 1.0,
-    "angular_momentum": 1.0,
-    "base_position": 1.0,
-    "base_quaternion_xyzw": 1.0,
-    "base_linear_velocity": 1.0,
-    "base_angular_velocity": 1.0,
-    "joint_positions": 1.0,
-    "joint_velocities": 1.0,
-    "contact_positions": 1.0,
-    "contact_forces": 50.0,
-    "thrust": 100.0,
-    "thrust_rate": 50.0,
-    "throttle": 50.0,
-}
-"""The decision variables of a knot in their order, each with the size that the solver sees as one.
 
-ẍ, ḣω, ḟ and T̈ are no variables: backward Euler makes them differences of these.
+@dataclass(frozen=True)
+class Variable:
+    """A decision variable of every knot: a quantity of the trajectory, and the size that the solver sees as one.
+
+    Raises:
+        FormulationError: there is no such quantity, or the scale is no positive number.
+    """
+
+    name: str  # one of `QUANTITIES`, which has its rows and its unit
+    scale: float = 1.0  # [unit of the quantity]
+
+    def __post_init__(self) -> None:
+        if self.name not in QUANTITIES:
+            raise FormulationError(unknown("variable", self.name, QUANTITIES))
+        if not 0 < self.scale < math.inf:
+            raise FormulationError(f"the scale of '{self.name}' is {self.scale}; expected a positive number")
+
+
+VARIABLES = (
+    Variable("com_position"),
+    Variable("com_velocity"),
+    Variable("angular_momentum"),
+    Variable("base_position"),
+    Variable("base_quaternion_xyzw"),
+    Variable("base_linear_velocity"),
+    Variable("base_angular_velocity"),
+    Variable("joint_positions"),
+    Variable("joint_velocities"),
+    Variable("contact_positions"),
+    Variable("contact_forces", 50.0),
+    Variable("thrust", 100.0),
+    Variable("thrust_rate", 50.0),
+    Variable("throttle", 50.0),
+)
+"""The paper's decision variables of a knot, in their order.
+
+ẍ, ḣω, ḟ and T̈ are no variables: an integration rule makes them differences of these.
 """
-INTERVAL_SCALE = 0.1  # of Δt [s]
+INTERVAL_SCALE = 0.1
+"""What the solver sees as one of Δt [s]."""
 
 
 @dataclass(frozen=True)
@@ -48,14 +66,15 @@ class Layout:
     scale: Array  # (size,)
 
     @classmethod
-    def of(cls, robot: Robot) -> Layout:
-        """Return the layout for a robot."""
+    def of(cls, robot: Robot, variables: Sequence[Variable] = VARIABLES) -> Layout:
+        """Return the layout of variables for a robot."""
         count = {"robot": 1, "joint": len(robot.joint_names), "contact": len(robot.contacts), "jet": len(robot.jets)}
         rows, scale, start = {}, list[float](), 0
-        for name, size in SCALES.items():
-            dimension = QUANTITIES[name].rows * count[QUANTITIES[name].of]
-            rows[name] = slice(start, start + dimension)
-            scale += [size] * dimension
+        for variable in variables:
+            quantity = QUANTITIES[variable.name]
+            dimension = quantity.rows * count[quantity.of]
+            rows[variable.name] = slice(start, start + dimension)
+            scale += [variable.scale] * dimension
             start += dimension
         return cls(rows, np.array(scale))
 
@@ -74,58 +93,15 @@ class Layout:
 
 
 @dataclass(frozen=True)
-class Knot:
-    """The variables of one knot as SX columns, in their own units."""
-
-    robot: Robot
-    com_position: SX
-    com_velocity: SX
-    angular_momentum: SX
-    base_position: SX
-    base_quaternion_xyzw: SX
-    base_linear_velocity: SX
-    base_angular_velocity: SX
-    joint_positions: SX
-    joint_velocities: SX
-    contact_positions: SX
-    contact_forces: SX
-    thrust: SX
-    thrust_rate: SX
-    throttle: SX
-
-    @cached_property
-    def base(self) -> Pose:
-        """Return w_H_base."""
-        return Pose(quaternion.rotation_matrix(self.base_quaternion_xyzw), self.base_position)
-
-    @cached_property
-    def _poses(self) -> dict[str, Pose]:
-        return {}
-
-    def pose(self, frame: str) -> Pose:
-        """Return w_H_frame; each frame's expression is made once."""
-        if frame not in self._poses:
-            tree = self.robot.kindyn.tree
-            self._poses[frame] = forward_kinematics(tree, tree.frame(frame), self.base, self.joint_positions)
-        return self._poses[frame]
-
-    @cached_property
-    def points(self) -> list[SX]:
-        """Return the contact points [m], (3, 1) each."""
-        return cs.vertsplit(self.contact_positions, 3) if self.robot.contacts else []
-
-    @cached_property
-    def forces(self) -> list[SX]:
-        """Return the contact forces [N], (3, 1) each."""
-        return cs.vertsplit(self.contact_forces, 3) if self.robot.contacts else []
-
-
-@dataclass(frozen=True)
 class Bounds:
     """Lower and upper bounds of every variable at every knot, in their own units: (dim, N + 1) each by name."""
 
     lower: dict[str, Array]
     upper: dict[str, Array]
+
+    def copy(self) -> Bounds:
+        """Return bounds that can change on their own."""
+        return Bounds(*({name: side[name].copy() for name in side} for side in (self.lower, self.upper)))
 
     def fix(self, name: str, knot: int, value: Array | float, within: float = 0.0) -> None:
         """Hold a variable at a value at one knot.
@@ -144,7 +120,7 @@ class Bounds:
         self.upper[name][:, knot] = np.clip(target + within, low, high)
 
 
-def ranges(robot: Robot, scenario: Scenario) -> Bounds:
+def ranges(robot: Robot, scenario: Scenario, layout: Layout) -> Bounds:
     """Return the box constraints that hold at every knot: limits of the robot, and of the scenario (eq. 28, 29)."""
     limits, jets, count = robot.joint_limits, robot.jets, scenario.knots + 1
     speed = scenario.base_speed_max
@@ -160,7 +136,7 @@ def ranges(robot: Robot, scenario: Scenario) -> Bounds:
         "throttle": (np.array([jet.throttle_min for jet in jets]), np.array([jet.throttle_max for jet in jets])),
     }
     lower, upper = {}, {}
-    for name, rows in Layout.of(robot).rows.items():
+    for name, rows in layout.rows.items():
         low, high = box.get(name, (-np.inf, np.inf))
         shape = (rows.stop - rows.start, count)
         lower[name] = np.array(np.broadcast_to(np.reshape(low, (-1, 1)), shape), dtype=float)

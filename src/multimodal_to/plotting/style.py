@@ -19,6 +19,7 @@ from multimodal_to.files.writing import whole
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import flight_phases
+from multimodal_to.trajectory.sameness import refuse_other_robot
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """What a figure can be saved as."""
@@ -57,8 +58,7 @@ def runs_of(robot: Robot, trajectories: Sequence[Trajectory], labels: Sequence[s
     if not 1 <= len(trajectories) <= len(STYLES):
         raise InputError(f"a figure shows 1 to {len(STYLES)} trajectories; there are {len(trajectories)}")
     for trajectory in trajectories:
-        if trajectory.joint_names != robot.joint_names:
-            raise InputError(f"the trajectory '{trajectory.scenario}' is for {trajectory.robot}, not for {robot.name}")
+        refuse_other_robot(trajectory, robot, what=f"the trajectory '{trajectory.scenario}'", of=("joints",))
     names = list(labels) if labels is not None else [trajectory.scenario for trajectory in trajectories]
     if len(names) != len(trajectories):
         raise InputError(f"there are {len(trajectories)} trajectories and {len(names)} labels; expected one for each")

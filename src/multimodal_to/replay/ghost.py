@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.bodies import draw_links, draw_visuals, drawn, faded, link_paths, link_poses
 from multimodal_to.replay.scene import Scene, shapes
 from multimodal_to.replay.visuals import Appearance
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.resampling import resample
+from multimodal_to.trajectory.sameness import refuse_other_robot
 
 GHOST_OPACITY = 0.35
 GHOST_COLOUR = 0x7A3FB5
@@ -22,11 +22,7 @@ def in_step(trajectory: Trajectory, ghost: Trajectory) -> Trajectory:
     Raises:
         InputError: the ghost is not one of the same robot.
     """
-    if (ghost.robot, ghost.joint_names) != (trajectory.robot, trajectory.joint_names):
-        raise InputError(
-            f"the motion to show with it is of '{ghost.robot}' with {len(ghost.joint_names)} joints; "
-            f"expected '{trajectory.robot}' with the same {len(trajectory.joint_names)} joints"
-        )
+    refuse_other_robot(ghost, trajectory, what="the motion to show with it", of=("joints",))
     times = ghost.time[0] + trajectory.time - trajectory.time[0]
     return resample(ghost, np.clip(times, ghost.time[0], ghost.time[-1]))
 

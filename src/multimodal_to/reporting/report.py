@@ -92,12 +92,17 @@ def _solve(trajectory: Trajectory) -> str:
     record = trajectory.solve_record()
     if not record:
         return '<p class="quiet">The file does not say how it was solved.</p>'
-    texts = {name: text for name, text in _solve_facts(record).items() if text}
+    texts = {name: text for name, text in _solve_facts(record, trajectory.unusual_formulation()).items() if text}
     return f'<table class="facts">{"".join(_row(("th", name), ("td", text)) for name, text in texts.items())}</table>'
 
 
-def _solve_facts(record: Mapping[str, Any]) -> dict[str, str]:
-    """Return the facts of a solve's record in words; those that it lacks are empty."""
+def _solve_facts(record: Mapping[str, Any], unusual: str = "") -> dict[str, str]:
+    """Return the facts of a solve's record in words; those that it lacks are empty.
+
+    Args:
+        record: as the trajectory's file keeps it.
+        unusual: how the problem differed from the paper's, in words.
+    """
     violations, costs, threads, versions = (
         part if isinstance(part := record.get(name), dict) else {}
         for name in ("violations", "costs", "threads", "versions")
@@ -111,6 +116,7 @@ def _solve_facts(record: Mapping[str, Any]) -> dict[str, str]:
         "time in the solver": _measured(record, "solve_time", ".1f", " s"),
         "objective": _measured(record, "objective", ".6g", ""),
         "largest costs": ", ".join(f"{name} {value:.3g}" for name, value in costliest),
+        "formulation": unusual,
         "largest violation": ", ".join(f"{value:.1e} ({name})" for name, value in worst),
         "linear solver": str(record.get("linear_solver", "")),
         "threads": ", ".join(f"{name} {count}" for name, count in threads.items() if count is not None),

@@ -21,6 +21,7 @@ from multimodal_to.simulation.model import DAMPING, STIFFNESS, TIME_STEP, Simula
 from multimodal_to.simulation.reference import Reference, reference
 from multimodal_to.simulation.stabiliser import Correction, Turbines, correct, rotation_vector
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.sameness import refuse_other_robot
 
 HOLD = 1.0  # how long the end of the plan is held [s]
 PERIOD = 4  # steps of the simulation between two decisions of the stabiliser [1]
@@ -65,13 +66,7 @@ def play(robot: Robot, plan: Trajectory, *, stabilise: bool = True, delay: float
     """
     if not 0.0 <= delay <= 1.0:
         raise InputError(f"the delay is {delay:g} intervals; expected 0 to 1")
-    names = (
-        (robot.joint_names, plan.joint_names),
-        (robot.contact_names, plan.contact_names),
-        (robot.jet_names, plan.jet_names),
-    )
-    if any(ours != theirs for ours, theirs in names):
-        raise TrajectoryError(f"the plan's joints, contact points or jets are not those of the robot '{robot.name}'")
+    refuse_other_robot(plan, robot, what="the plan", error=TrajectoryError)
     scenario = stored(plan)
     friction = robot.friction if scenario is None or scenario.friction is None else scenario.friction
     low, high = (getattr(plan.com_position[:2], end)(axis=1) for end in ("min", "max"))

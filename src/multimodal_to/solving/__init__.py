@@ -1,8 +1,23 @@
 """How a problem is solved, and what came out of it."""
 
-from multimodal_to.solving.elastic import Relaxation, relax
-from multimodal_to.solving.misses import Miss
+from multimodal_to.solving.ipopt import Ipopt
+from multimodal_to.solving.relaxation import Relaxation, relax
 from multimodal_to.solving.solution import Iterate, Solution, solve
-from multimodal_to.solving.solvers import Ipopt, Status
+from multimodal_to.solving.solver import Ending, Solver, StartPoint, Watch
+from multimodal_to.solving.status import Status
+from multimodal_to.solving.violations import Violation
 
-__all__ = ["Ipopt", "Iterate", "Miss", "Relaxation", "Solution", "Status", "relax", "solve"]
+__all__ = [
+    "Ending",
+    "Ipopt",
+    "Iterate",
+    "Relaxation",
+    "Solution",
+    "Solver",
+    "StartPoint",
+    "Status",
+    "Violation",
+    "Watch",
+    "relax",
+    "solve",
+]

@@ -16,22 +16,19 @@ from multimodal_to.errors import OutputError
 from multimodal_to.ocp.problem import Problem
 from multimodal_to.solving.motion import motion
 from multimodal_to.solving.record import Kind, to_json
-from multimodal_to.solving.solvers import Phase
-
-FEASIBLE = 1e-5
-"""Greatest violation of a feasible iterate, in solver units: 1e-5 m, rad, N m and so on, and 5e-4 N."""
+from multimodal_to.solving.solver import FEASIBLE
 
 CHECKPOINT_EVERY = 5.0
 """Least time between two checkpoints [s], but for the first feasible iterate, which is written at once."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Kept:
-    """An iterate that is kept."""
+class Candidate:
+    """An iterate, with what makes it better or worse than another."""
 
     x: Array
     iteration: int
-    phase: Phase
+    label: str  # as in `Watch`
     objective: float
     violation: float  # the largest, in solver units
 
@@ -45,7 +42,7 @@ class Kept:
         """Return whether rows, bounds and objective are numbers."""
         return math.isfinite(self.violation) and math.isfinite(self.objective)
 
-    def better_than(self, other: Kept) -> bool:
+    def better_than(self, other: Candidate) -> bool:
         """Return whether to keep this one: of feasible iterates the lowest objective, else the least violation."""
         if self.feasible and other.feasible:
             return self.objective < other.objective
@@ -57,33 +54,33 @@ class Best:
 
     def __init__(self, problem: Problem, checkpoint: Checkpoint | None = None) -> None:
         self._problem, self._checkpoint = problem, checkpoint
-        self._kept: Kept | None = None
+        self._kept: Candidate | None = None
         self.seen = 0  # iterates of the solver
 
-    def seed(self, x: Array, phase: Phase) -> None:
+    def seed(self, x: Array, label: str) -> None:
         """Keep what a solve starts from, so that it ends with nothing worse."""
-        self._keep(self._evaluated(x, 0, phase))
+        self._keep(self._evaluated(x, 0, label))
 
-    def show(self, x: Array, rows: Array, objective: float, iteration: int, phase: Phase) -> None:
+    def show(self, x: Array, rows: Array, objective: float, iteration: int, label: str) -> None:
         """Keep an iterate, with its rows g(x), if it is better than the one kept, and see to the checkpoint."""
         self.seen += 1
         violation = self._problem.scaled_violation(x, rows)
-        self._keep(Kept(x=x, iteration=iteration, phase=phase, objective=objective, violation=violation))
+        self._keep(Candidate(x=x, iteration=iteration, label=label, objective=objective, violation=violation))
         if self._checkpoint is not None and self._kept is not None:
             self._checkpoint.update(self._problem, self._kept, iteration)
 
-    def end(self, x: Array, iteration: int, phase: Phase, *, answer: bool) -> Kept:
+    def end(self, x: Array, iteration: int, label: str, *, answer: bool) -> Candidate:
         """Return what a solve ends with: the solver's last x if that is an answer, else the best iterate."""
-        last = self._evaluated(x, iteration, phase)
+        last = self._evaluated(x, iteration, label)
         self._keep(last)
         return last if answer or self._kept is None else self._kept
 
-    def _evaluated(self, x: Array, iteration: int, phase: Phase) -> Kept:
+    def _evaluated(self, x: Array, iteration: int, label: str) -> Candidate:
         violation = self._problem.scaled_violation(x, self._problem.rows_at(x))
         objective = sum(self._problem.costs(x).values())
-        return Kept(x=x, iteration=iteration, phase=phase, objective=objective, violation=violation)
+        return Candidate(x=x, iteration=iteration, label=label, objective=objective, violation=violation)
 
-    def _keep(self, new: Kept) -> None:
+    def _keep(self, new: Candidate) -> None:
         if new.finite and (self._kept is None or new.better_than(self._kept)):
             self._kept = new
 
@@ -94,9 +91,9 @@ class Checkpoint:
     def __init__(self, path: str | os.PathLike[str], environment: Mapping[str, Any]) -> None:
         self._path, self._environment = Path(path), environment
         self._started = self._written_at = time.perf_counter()
-        self._written: Kept | None = None
+        self._written: Candidate | None = None
 
-    def update(self, problem: Problem, kept: Kept, iterations: int) -> None:
+    def update(self, problem: Problem, kept: Candidate, iterations: int) -> None:
         """Write what is kept if it is new and time has passed, or if it is the first feasible one.
 
         A file that cannot be written is a warning, once: the solve is worth more than its checkpoint.
@@ -113,7 +110,7 @@ class Checkpoint:
             return
         self._written, self._written_at = kept, time.perf_counter()
 
-    def _record(self, problem: Problem, kept: Kept, iterations: int) -> str:
+    def _record(self, problem: Problem, kept: Candidate, iterations: int) -> str:
         return to_json(
             kind=Kind.CHECKPOINT,
             status="running",
@@ -124,7 +121,7 @@ class Checkpoint:
             costs=problem.costs(kept.x),
             violations=problem.largest_violations(kept.x),
             iteration=kept.iteration,
-            phase=kept.phase.value,
             feasible=kept.feasible,
+            **{"pass": kept.label},
             **self._environment,
         )

@@ -11,11 +11,14 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import InputError, TrajectoryError, listed, unknown
+from multimodal_to.errors import LONGEST, InputError, TrajectoryError, listed, shortened, unknown
 from multimodal_to.files.writing import whole
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing, text, texts
 from multimodal_to.trajectory.format import ENTRIES, FORMAT_VERSION, FORMATS
 from multimodal_to.trajectory.quantities import QUANTITIES, labels
+
+PAPER_RULE = "backward Euler"
+"""Name of the integration rule that the rates of a trajectory follow."""
 
 _NO_ROTATION = 1e-6
 """A quaternion all of whose parts are smaller cannot be made a unit one."""
@@ -111,6 +114,26 @@ class Trajectory:
         if not isinstance(record, dict):
             raise TrajectoryError(f"the record of the solve of '{self.scenario}' is no JSON object")
         return record
+
+    def unusual_formulation(self) -> str:
+        """Return in words how the problem that was solved differs from the paper's, by the names of its terms.
+
+        Empty where it does not differ, or where the file does not say. A file keeps the names of terms, not the terms.
+
+        Raises:
+            TrajectoryError: `solve_json` is no JSON object.
+        """
+        record = self.solve_record().get("formulation")
+        if not isinstance(record, dict):
+            return ""
+        parts = [
+            f"{words} {', '.join(str(name) for name in names)}"
+            for key, words in (("own_terms", "terms of its own:"), ("left_out", "left out of the paper's:"))
+            if isinstance(names := record.get(key), list) and names
+        ]
+        if isinstance(rule := record.get("rule"), str) and rule != PAPER_RULE:
+            parts.append(f"integration by {rule}")
+        return shortened("; ".join(parts), LONGEST)
 
     def labels(self, name: str) -> tuple[str, ...]:
         """Return what the rows of a quantity are called, such as `l_knee` or `l_sole_1 z`.

@@ -10,8 +10,8 @@ import pytest
 
 import multimodal_to as mt
 from multimodal_to.errors import InputError
-from multimodal_to.ocp.naming import components
-from multimodal_to.solving import elastic
+from multimodal_to.solving import relaxation as room
+from multimodal_to.trajectory import labels
 
 LEGS = 0.6
 """How far below the iRonCub's CoM a contact point may be [m], its `contact_reach`; a standing CoM cannot be higher."""
@@ -44,8 +44,8 @@ def solution(too_high):
 def test_an_infeasible_end_names_rows_knot_component_and_amount(too_high, solution):
     assert solution.status is mt.Status.INFEASIBLE
     assert not solution.feasible
-    worst = solution.misses[0]
-    assert {miss.name for miss in solution.misses} <= set(solution.violations)
+    worst = solution.unmet[0]
+    assert {some.name for some in solution.unmet} <= set(solution.violations)
     assert (worst.name, worst.knot) == ("contact_reach", 10)
     assert worst.amount == pytest.approx(solution.violations["contact_reach"])
     foot = worst.component.removesuffix(" z")
@@ -58,25 +58,25 @@ def test_an_infeasible_end_names_rows_knot_component_and_amount(too_high, soluti
 def test_a_contradiction_is_told_by_the_fewest_rows_that_have_to_give_way(too_high, solution):
     relaxation = mt.relax(too_high, solution.trajectory)
     assert relaxation.status is mt.Status.OPTIMAL
-    assert [miss.name for miss in relaxation.gives_way] == ["contact_reach", "com_kinematics"]
+    assert [some.name for some in relaxation.gives_way] == ["contact_reach", "com_kinematics"]
     reach = relaxation.gives_way[0]
-    assert (reach.knot, reach.missed) == (10, 8)
+    assert (reach.knot, reach.violated) == (10, 8)
     assert reach.amount == pytest.approx((0.70 - LEGS) / LEGS, rel=0.05)
 
 
-def test_only_the_families_that_may_give_way_do_and_the_others_hold(too_high, solution):
-    families = {"contact_reach", "com_kinematics"}
-    relaxation = mt.relax(too_high, solution.trajectory, families=sorted(families))
+def test_only_the_terms_that_may_give_way_do_and_the_others_hold(too_high, solution):
+    chosen = {"contact_reach", "com_kinematics"}
+    relaxation = mt.relax(too_high, solution.trajectory, terms=sorted(chosen))
     assert relaxation.status is mt.Status.OPTIMAL
-    assert {miss.name for miss in relaxation.gives_way} == families
+    assert {some.name for some in relaxation.gives_way} == chosen
     met = too_high.largest_violations(too_high.start_from(relaxation.trajectory))
-    assert max(amount for name, amount in met.items() if name not in families) < 1e-5
-    for miss in relaxation.gives_way:
-        assert miss.amount == pytest.approx(met[miss.name], abs=1e-6)
+    assert max(amount for name, amount in met.items() if name not in chosen) < 1e-5
+    for some in relaxation.gives_way:
+        assert some.amount == pytest.approx(met[some.name], abs=1e-6)
 
 
-def test_a_family_that_cannot_make_up_for_it_is_not_called_the_answer(too_high, solution):
-    relaxation = mt.relax(too_high, solution.trajectory, mt.Ipopt(max_iterations=60), families=["sliding"])
+def test_a_term_that_cannot_make_up_for_it_is_not_called_the_answer(too_high, solution):
+    relaxation = mt.relax(too_high, solution.trajectory, mt.Ipopt(max_iterations=60), terms=["sliding"])
     assert not relaxation.status.solved
 
 
@@ -87,9 +87,9 @@ def test_where_the_rows_can_be_met_nothing_gives_way(ironcub, stand):
     assert problem.largest_violations(problem.start_from(relaxation.trajectory))["com_kinematics"] < 1e-4
 
 
-def test_rows_that_do_not_exist_are_refused(too_high):
-    with pytest.raises(InputError, match="unknown rows 'com_kinematic'; did you mean 'com_kinematics'"):
-        mt.relax(too_high, families=["com_kinematic"])
+def test_constraints_that_do_not_exist_are_refused(too_high):
+    with pytest.raises(InputError, match="unknown constraint 'com_kinematic'; did you mean 'com_kinematics'"):
+        mt.relax(too_high, terms=["com_kinematic"])
 
 
 def test_the_derivatives_of_the_relaxed_problem_are_those_of_its_functions(too_high):
@@ -97,7 +97,8 @@ def test_the_derivatives_of_the_relaxed_problem_are_those_of_its_functions(too_h
     random = np.random.default_rng(0)
     chosen = np.sort(random.choice(too_high.row_lower.size, 50, replace=False))
     start = too_high.guess
-    nlp, functions = elastic._relaxed(too_high, chosen, start)
+    elastic = replace(room._Elastic.of(too_high, tuple(too_high.rows)), chosen=chosen)
+    nlp, functions = room._relaxed(too_high, elastic, start)
     rows_at = cs.Function("rows", [nlp["x"]], [nlp["g"]])
     objective = cs.Function("objective", [nlp["x"]], [nlp["f"]])
     y = np.concatenate([start + 0.01 * random.normal(size=start.size), random.uniform(size=100)])
@@ -121,13 +122,13 @@ def test_the_derivatives_of_the_relaxed_problem_are_those_of_its_functions(too_h
     assert np.allclose(cs.mtimes(hessian, way).full().ravel(), turned, rtol=1e-4, atol=1e-3)
 
 
-def test_every_row_of_every_family_has_a_knot_and_a_name(ironcub):
+def test_every_row_of_every_term_has_a_knot_and_a_name(ironcub):
     problem = mt.build(ironcub, replace(mt.scenarios.take_off(), knots=5))
     for name, rows in problem.rows.items():
         assert rows.index.size == rows.knots.size == rows.components.size, name
         assert rows.knots.min() >= 0, name
         assert rows.knots.max() == (0 if name == "static_equilibrium" else 5), name
     assert sorted(np.concatenate([rows.index for rows in problem.rows.values()])) == list(range(problem.row_lower.size))
-    assert set(problem.rows["contact_kinematics"].components) == set(components(ironcub, "contact", 24))
+    assert set(problem.rows["contact_kinematics"].components) == set(labels("contact_positions", ironcub))
     assert set(problem.rows["thrust_dynamics"].components) == set(ironcub.jet_names)
-    assert components(ironcub, "robot", 6)[3] == "angular x"
+    assert problem.rows["static_equilibrium"].components[3] == "angular x"

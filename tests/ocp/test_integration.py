@@ -5,11 +5,13 @@ import numpy as np
 import pytest
 
 from multimodal_to.adam import quaternion
-from multimodal_to.ocp.integrators import gap, rotation_gap
+from multimodal_to.ocp.integration import BACKWARD_EULER, Interval
 
 
 def test_the_gap_closes_when_the_end_is_the_start_plus_rate_times_interval():
-    assert gap(1.0, 1.6, 2.0, 0.3) == pytest.approx(0.0)
+    interval = Interval(1.0, 1.6, 0.3, BACKWARD_EULER)
+    assert interval.gap(lambda position: position, lambda position: 2.0) == pytest.approx(0.0)
+    assert interval.rate(lambda position: position) == pytest.approx(2.0)
 
 
 def test_a_constant_angular_velocity_turns_the_whole_angle():
@@ -20,7 +22,8 @@ def test_a_constant_angular_velocity_turns_the_whole_angle():
     start /= np.linalg.norm(start)
     end = cs.DM(start)
     for _ in range(10):
-        end = end - rotation_gap(end, end, cs.DM(omega), dt)  # the gap of standing still is what has to be moved
+        still = Interval(end, end, dt, BACKWARD_EULER)  # the gap of standing still is what has to be moved
+        end = end - still.rotation_gap(lambda quaternion: quaternion, lambda quaternion: cs.DM(omega))
     whole = quaternion.rotation_matrix(quaternion.exp(cs.DM(omega * 10 * dt)))
     expected = np.array(whole) @ np.array(quaternion.rotation_matrix(cs.DM(start)))
     assert np.array(quaternion.rotation_matrix(end)) == pytest.approx(expected, abs=1e-12)

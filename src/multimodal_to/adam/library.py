@@ -1,0 +1,135 @@
+"""A robot's library without its quantities: the robot, how velocities are written, gravity, and the functions made."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Self
+
+import casadi as cs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from multimodal_to.adam.representation import Representations, checked_representation
+from multimodal_to.adam.tree import Tree
+from multimodal_to.adam.urdf import load_tree
+from multimodal_to.errors import InputError, ModelError
+
+GRAVITY = (0.0, 0.0, -9.80665)
+"""Standard acceleration of free fall in world axes [m/s²]."""
+
+
+class Library:
+    """What the quantities of a robot need; `KinDynComputations` adds the quantities, and describes the arguments."""
+
+    def __init__(
+        self,
+        urdfstring: str | os.PathLike[str],
+        joints_name_list: Sequence[str] | None = None,
+        root_link: str | None = None,
+        gravity: ArrayLike = GRAVITY,
+        f_opts: Mapping[str, Any] | None = None,
+        *,
+        representation: Representations | int = Representations.MIXED_REPRESENTATION,
+        locked_joints: Mapping[str, float] | None = None,
+    ) -> None:
+        self.tree: Tree = load_tree(urdfstring, joints_name_list, locked_joints)
+        if root_link not in (None, self.tree.base):
+            raise ModelError(f"the root link is '{self.tree.base}', not '{root_link}'")
+        self._gravity = _checked_gravity(gravity)
+        self._representation = checked_representation(representation)
+        self._f_opts = dict(f_opts or {})
+        self._functions: dict[tuple[object, ...], cs.Function] = {}
+
+    @classmethod
+    def from_urdf(
+        cls,
+        urdfstring: str | os.PathLike[str],
+        joints_name_list: Sequence[str] | None = None,
+        root_link: str | None = None,
+        gravity: ArrayLike = GRAVITY,
+        f_opts: Mapping[str, Any] | None = None,
+    ) -> Self:
+        """Return the library of a URDF's robot: the constructor under adam's other name, with its arguments."""
+        return cls(urdfstring, joints_name_list, root_link, gravity, f_opts)
+
+    # ---------------------------------------------------------------- the robot
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Return the joints in the order of s."""
+        return self.tree.joint_names
+
+    @property
+    def NDoF(self) -> int:
+        """Return the number of joints n (adam's name)."""
+        return len(self.tree.joints)
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Return the names of all frames: every link of the URDF."""
+        return tuple(self.tree.frames)
+
+    def get_total_mass(self) -> float:
+        """Return the total mass [kg]."""
+        return self.tree.total_mass
+
+    # ---------------------------------------------------------------- what may change
+
+    @property
+    def representation(self) -> Representations:
+        """Return how velocities are written."""
+        return self._representation
+
+    def set_frame_velocity_representation(self, representation: Representations | int) -> None:
+        """Let every later call be in `representation`, a member of our `Representations` or of adam's (adam's name).
+
+        A function that was made before keeps its representation. A robot of `load_robot` needs the mixed one: change
+        the representation of an object of your own.
+
+        Raises:
+            InputError: the representation is unknown.
+        """
+        self._representation = checked_representation(representation)
+
+    @property
+    def gravity(self) -> np.ndarray:
+        """Return the acceleration of free fall in world axes, (3,) [m/s²]; it cannot be written to."""
+        return self._gravity
+
+    @property
+    def g(self) -> np.ndarray:
+        """Return gravity and three zeros, (6,) [m/s²] (adam's name); a new value holds for every later call.
+
+        Raises:
+            InputError: the new value is not three finite numbers, with or without three zeros behind.
+        """
+        return np.concatenate([self._gravity, np.zeros(3)])
+
+    @g.setter
+    def g(self, gravity: ArrayLike) -> None:
+        self._gravity = _checked_gravity(gravity)
+
+    @property
+    def f_opts(self) -> dict[str, Any]:
+        """Return a copy of the options of every `casadi.Function` that is built (adam's name)."""
+        return dict(self._f_opts)
+
+    # ---------------------------------------------------------------- the functions
+
+    def _kept(self, key: tuple[str, ...], make: Callable[[], cs.Function]) -> cs.Function:
+        """Return the function of a key under the present representation and gravity; make it where it is not there."""
+        whole = (self.representation, *self.gravity, *key)
+        if whole not in self._functions:
+            self._functions[whole] = make()
+        return self._functions[whole]
+
+
+def _checked_gravity(gravity: ArrayLike) -> np.ndarray:
+    vector = np.array(gravity, dtype=float).ravel()
+    if vector.shape == (6,) and not vector[3:].any():  # adam's form
+        vector = vector[:3]
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise InputError(f"gravity is {gravity!r}; expected three finite numbers, for example {GRAVITY}")
+    vector.flags.writeable = False
+    return vector

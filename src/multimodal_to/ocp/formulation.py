@@ -1,0 +1,108 @@
+"""`Formulation`: what the optimal control problem is made of."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+
+from multimodal_to.errors import FormulationError, listed, shown, unknown
+from multimodal_to.ocp import paper
+from multimodal_to.ocp.integration import BACKWARD_EULER, IntegrationRule
+from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.terms import Constraint, Cost, Term
+from multimodal_to.ocp.variables import INTERVAL_SCALE, VARIABLES, Variable
+
+_NEEDED = tuple(entry.name for entry in fields(Knot) if entry.name != "robot")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Formulation:
+    """The decision variables of a knot, the integration rule, and the terms: constraints and costs, each with a name.
+
+    Raises:
+        FormulationError: a name stands twice, a variable is missing, or something is no term.
+    """
+
+    variables: tuple[Variable, ...] = VARIABLES
+    rule: IntegrationRule = BACKWARD_EULER
+    terms: tuple[Term, ...]
+    interval_scale: float = INTERVAL_SCALE  # the size of Δt that the solver sees as one [s]
+
+    def __post_init__(self) -> None:
+        for term in self.terms:
+            if not isinstance(term, Constraint | Cost):
+                raise FormulationError(f"{shown(term)} is no term; expected a Constraint or a Cost")
+        for kind, entries in (("term", self.terms), ("variable", self.variables)):
+            counts = Counter(entry.name for entry in entries)
+            if twice := [name for name, count in counts.items() if count > 1]:
+                raise FormulationError(f"the {kind} name {listed(twice)} is taken already; expected each name once")
+        if missing := [name for name in _NEEDED if name not in {variable.name for variable in self.variables}]:
+            raise FormulationError(f"the formulation lacks the variables {listed(missing)}")
+        if extra := [variable.name for variable in self.variables if variable.name not in _NEEDED]:
+            raise FormulationError(f"{listed(extra)} cannot be variables; expected {listed(_NEEDED)}")
+        if not 0 < self.interval_scale < math.inf:
+            raise FormulationError(f"interval_scale is {self.interval_scale}; expected a positive number [s]")
+
+    @classmethod
+    def paper(cls) -> Formulation:
+        """Return the problem of L'Erario et al. 2022, which `build` takes by default."""
+        return cls(terms=paper.TERMS)
+
+    @property
+    def constraints(self) -> tuple[Constraint, ...]:
+        """Return the constraints, in order."""
+        return tuple(term for term in self.terms if isinstance(term, Constraint))
+
+    @property
+    def costs(self) -> tuple[Cost, ...]:
+        """Return the costs, in order."""
+        return tuple(term for term in self.terms if isinstance(term, Cost))
+
+    @property
+    def own_terms(self) -> tuple[str, ...]:
+        """Return the names of the terms that are not the paper's."""
+        return tuple(term.name for term in self.terms if term not in paper.TERMS)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Return the names of the paper's terms that are not among these."""
+        return tuple(term.name for term in paper.TERMS if term not in self.terms)
+
+    def with_terms(self, *terms: Term) -> Formulation:
+        """Return the formulation with more terms.
+
+        Raises:
+            FormulationError: a name is taken already.
+        """
+        return replace(self, terms=(*self.terms, *terms))
+
+    def without(self, *names: str) -> Formulation:
+        """Return the formulation without the terms of these names.
+
+        Raises:
+            FormulationError: there is no term of a name.
+        """
+        known = [term.name for term in self.terms]
+        for name in names:
+            if name not in known:
+                raise FormulationError(unknown("term", name, known))
+        return replace(self, terms=tuple(term for term in self.terms if term.name not in names))
+
+    def with_scales(self, scales: Mapping[str, float]) -> Formulation:
+        """Return the formulation with other sizes of variables that the solver sees as one, by name [own unit].
+
+        Raises:
+            FormulationError: there is no variable of a name, or a scale is no positive number.
+        """
+        known = [variable.name for variable in self.variables]
+        for name in scales:
+            if name not in known:
+                raise FormulationError(unknown("variable", name, known))
+        changed = (Variable(entry.name, scales.get(entry.name, entry.scale)) for entry in self.variables)
+        return replace(self, variables=tuple(changed))
+
+    def described(self) -> dict[str, object]:
+        """Return what the record of a solve says of the formulation: its rule, and what differs from the paper's."""
+        return {"rule": self.rule.name, "own_terms": list(self.own_terms), "left_out": list(self.left_out)}

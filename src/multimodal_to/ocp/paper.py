@@ -1,0 +1,267 @@
+"""The terms of the paper's problem: where each of its functions holds or is charged, in which unit and within what.
+
+They are made as a user's own terms are. The first few places matter: rows and costs stand in the problem in this order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from multimodal_to.adam.spatial import Array
+from multimodal_to.models.contact import FACES
+from multimodal_to.ocp import constraints, costs
+from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.ocp.terms import (
+    Constraint,
+    Cost,
+    IntervalFunction,
+    KnotFunction,
+    Labels,
+    Where,
+    at_least,
+    at_most,
+    between,
+    equal,
+)
+from multimodal_to.scenarios.scenario import Start, Terminal
+from multimodal_to.trajectory.quantities import TWIST, XYZ, XYZW, row_labels
+
+ON_GROUND = 1e-5
+"""Largest height of a contact point that stands [m]: a sole has more corners than a plane needs."""
+
+FORCE = 50.0
+"""Size of a force that the solver takes for one [N]."""
+
+
+def _each(of: str, *axes: str) -> Labels:
+    """Return the labels of rows that are repeated for each "joint", "contact" or "jet"."""
+    return lambda parameters: row_labels(parameters.robot, of, axes or ("",))
+
+
+def _hovers_first(parameters: Parameters) -> bool:
+    return parameters.scenario.start is Start.HOVER
+
+
+def _stands_last(parameters: Parameters) -> bool:
+    return parameters.scenario.terminal is Terminal.STANDING
+
+
+# -------------------------------------------------------------------- constraints
+
+UNIT_QUATERNION = Constraint(
+    value=constraints.unit_quaternion, within=equal(), unit="1", holds=Where.FIRST_KNOT, when=_hovers_first
+)
+COM_KINEMATICS = Constraint(value=constraints.com_kinematics, within=equal(), unit="m", labels=XYZ)
+ANGULAR_MOMENTUM_KINEMATICS = Constraint(
+    value=constraints.angular_momentum_kinematics,
+    within=equal(),
+    unit="kg m²/s",
+    holds=Where.LATER_KNOTS,
+    labels=XYZ,
+)
+CONTACT_KINEMATICS = Constraint(
+    value=constraints.contact_kinematics, within=equal(), unit="m", labels=_each("contact", *XYZ)
+)
+NON_PENETRATION = Constraint(
+    name="non_penetration",
+    value=constraints.heights,
+    within=at_least(0.0),
+    unit="m",
+    labels=_each("contact"),
+    rigid=True,
+)
+FRICTION_CONE = Constraint(
+    value=constraints.friction_cone,
+    within=at_least(0.0),
+    unit="N",
+    holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
+    scale=FORCE,
+    labels=lambda parameters: row_labels(parameters.robot, "contact", FACES[parameters.scenario.friction_cone]),
+)
+COMPLEMENTARITY = Constraint(
+    value=constraints.complementarity,
+    within=at_most(lambda parameters: parameters.scenario.complementarity_max),
+    unit="N m",
+    holds=Where.LATER_KNOTS,
+    labels=_each("contact"),
+)
+CONTACT_REACH = Constraint(
+    value=constraints.contact_reach,
+    within=between(-1.0, 1.0),
+    unit="1",
+    holds=Where.LATER_KNOTS,
+    labels=_each("contact", *XYZ),
+)
+JET_REACH = Constraint(
+    value=constraints.jet_reach,
+    within=between(-1.0, 1.0),
+    unit="1",
+    holds=Where.LATER_KNOTS,
+    labels=_each("jet", *XYZ),
+)
+STATIC_EQUILIBRIUM = Constraint(
+    value=constraints.static_equilibrium,
+    within=equal(),
+    unit=("N", "N", "N", "N m", "N m", "N m"),
+    holds=Where.FIRST_KNOT,
+    scale=FORCE,
+    labels=TWIST,
+)
+STEADY_THRUST = Constraint(
+    value=constraints.steady_thrust,
+    within=equal(),
+    unit="N/s²",
+    holds=Where.FIRST_KNOT,
+    scale=FORCE,
+    labels=_each("jet"),
+    when=_hovers_first,
+)
+MOMENTUM_DYNAMICS = Constraint(
+    value=constraints.momentum_dynamics,
+    within=equal(),
+    unit=("m/s", "m/s", "m/s", "kg m²/s", "kg m²/s", "kg m²/s"),
+    holds=Where.EVERY_INTERVAL,
+    labels=TWIST,
+)
+COM_INTEGRATION = Constraint(
+    value=constraints.com_integration, within=equal(), unit="m", holds=Where.EVERY_INTERVAL, labels=XYZ
+)
+BASE_POSITION_INTEGRATION = Constraint(
+    value=constraints.base_position_integration, within=equal(), unit="m", holds=Where.EVERY_INTERVAL, labels=XYZ
+)
+BASE_ORIENTATION_INTEGRATION = Constraint(
+    value=constraints.base_orientation_integration,
+    within=equal(),
+    unit="1",
+    holds=Where.EVERY_INTERVAL,
+    labels=XYZW,
+)
+JOINT_INTEGRATION = Constraint(
+    value=constraints.joint_integration,
+    within=equal(),
+    unit="rad",
+    holds=Where.EVERY_INTERVAL,
+    labels=_each("joint"),
+)
+THRUST_INTEGRATION = Constraint(
+    value=constraints.thrust_integration,
+    within=equal(),
+    unit="N",
+    holds=Where.EVERY_INTERVAL,
+    scale=FORCE,
+    labels=_each("jet"),
+)
+THRUST_DYNAMICS = Constraint(
+    value=constraints.thrust_dynamics,
+    within=equal(),
+    unit="N/s",
+    holds=Where.EVERY_INTERVAL,
+    scale=FORCE,
+    labels=_each("jet"),
+)
+SLIDING = Constraint(
+    value=constraints.sliding,
+    within=between(
+        lambda parameters: -parameters.scenario.sliding_max, lambda parameters: parameters.scenario.sliding_max
+    ),
+    unit="N m",
+    holds=Where.EVERY_INTERVAL,
+    labels=_each("contact", "x", "y"),
+)
+STANDING_HEIGHT = Constraint(
+    name="standing_height",
+    value=constraints.heights,
+    within=between(0.0, ON_GROUND),
+    unit="m",
+    holds=Where.LAST_KNOT,
+    labels=_each("contact"),
+    when=_stands_last,
+    rigid=True,
+)
+
+CONSTRAINTS = (
+    UNIT_QUATERNION,
+    COM_KINEMATICS,
+    ANGULAR_MOMENTUM_KINEMATICS,
+    CONTACT_KINEMATICS,
+    NON_PENETRATION,
+    FRICTION_CONE,
+    COMPLEMENTARITY,
+    CONTACT_REACH,
+    JET_REACH,
+    STATIC_EQUILIBRIUM,
+    STEADY_THRUST,
+    MOMENTUM_DYNAMICS,
+    COM_INTEGRATION,
+    BASE_POSITION_INTEGRATION,
+    BASE_ORIENTATION_INTEGRATION,
+    JOINT_INTEGRATION,
+    THRUST_INTEGRATION,
+    THRUST_DYNAMICS,
+    SLIDING,
+    STANDING_HEIGHT,
+)
+
+# -------------------------------------------------------------------- costs
+
+
+def _weight_of(name: str) -> Callable[[Parameters], float | Array]:
+    """Return the scenario's weight of a name; one by joint group becomes one for each joint."""
+
+    def weight(parameters: Parameters) -> float | Array:
+        value = getattr(parameters.scenario.weights, name)
+        if isinstance(value, int | float):
+            return float(value)
+        by_joint = np.zeros(len(parameters.robot.joint_names))
+        for group, number in value.items():
+            by_joint[parameters.robot.group_indices(group)] = number
+        return by_joint
+
+    return weight
+
+
+def _running(
+    residual: KnotFunction | IntervalFunction,
+    unit: str | tuple[str, ...],
+    *charged: Where,
+    scale: float = 1.0,
+) -> Cost:
+    """Return a cost that is charged per second."""
+    name = residual.__name__
+    places = charged or (Where.LATER_KNOTS,)
+    return Cost(residual=residual, weight=_weight_of(name), unit=unit, charged=places, scale=scale)
+
+
+def _once(name: str, residual: KnotFunction | IntervalFunction, unit: str, where: Where = Where.LAST_KNOT) -> Cost:
+    """Return a cost that is charged once."""
+    return Cost(name=name, residual=residual, weight=_weight_of(name), unit=unit, charged=where, per_second=False)
+
+
+_TWIST_RATE = ("m/s²", "m/s²", "m/s²", "rad/s²", "rad/s²", "rad/s²")
+
+COSTS = (
+    _running(costs.com_velocity, "m/s"),
+    _running(costs.com_acceleration, "m/s²", Where.EVERY_INTERVAL),
+    _running(costs.angular_momentum, "kg m²/s"),
+    _running(costs.angular_momentum_rate, "N m", Where.EVERY_INTERVAL),
+    _running(costs.base_acceleration, _TWIST_RATE, Where.EVERY_INTERVAL),
+    _running(costs.joint_velocities, "rad/s"),
+    _running(costs.posture, "rad"),
+    _running(costs.base_orientation, "1"),
+    _running(costs.contact_forces, "N", Where.FIRST_KNOT, Where.LATER_KNOTS, scale=50.0),
+    _running(costs.contact_force_rates, "N/s", Where.EVERY_INTERVAL, scale=50.0),
+    _running(costs.thrust, "N", scale=100.0),
+    _running(costs.thrust_rate, "N/s", scale=50.0),
+    _running(costs.throttle, "%", scale=50.0),
+    _once("initial_posture", costs.posture, "rad", Where.FIRST_KNOT),
+    _once("final_posture", costs.posture, "rad"),
+    _once("final_com_velocity", costs.com_velocity, "m/s"),
+    _once("final_com_acceleration", costs.com_acceleration, "m/s²", Where.LAST_INTERVAL),
+    _once("final_angular_momentum", costs.angular_momentum, "kg m²/s"),
+    _once("final_angular_momentum_rate", costs.angular_momentum_rate, "N m", Where.LAST_INTERVAL),
+)
+
+TERMS = (*CONSTRAINTS, *COSTS)
+"""Every term of the paper's problem, in order."""

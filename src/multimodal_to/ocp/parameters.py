@@ -1,0 +1,31 @@
+"""`Parameters`: what the terms of a problem may read beside its variables; it is fixed while a problem is solved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from multimodal_to.models.robot import Posture, Robot
+from multimodal_to.models.terrain import CachedSurface, Surface
+from multimodal_to.scenarios.scenario import Scenario
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters:
+    """What is given in a problem: the robot, the task, the ground, and the posture that the motion stands in."""
+
+    robot: Robot  # with the jets that the scenario uses
+    scenario: Scenario
+    surface: Surface
+    friction: float  # Coulomb's coefficient [1]
+    standing: Posture  # near home, with the CoM where the motion starts
+
+    @classmethod
+    def of(cls, robot: Robot, scenario: Scenario, standing: Posture) -> Parameters:
+        """Return the parameters of a scenario; a friction that it leaves open is the robot's."""
+        return cls(
+            robot=robot,
+            scenario=scenario,
+            surface=CachedSurface(scenario.surface),
+            friction=scenario.friction or robot.friction,
+            standing=standing,
+        )

@@ -1,0 +1,287 @@
+"""`Constraint` and `Cost`: a term of a problem is one plain function and what the solver needs to know of it.
+
+A function of a knot takes `(knot, parameters)`, a function of an interval takes `(interval, parameters)`; both return
+a column of CasADi expressions, (m, 1), and neither knows where on the horizon it is.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import casadi as cs
+import numpy as np
+
+from multimodal_to.adam.spatial import SX, Array
+from multimodal_to.errors import FormulationError, MultimodalError, listed, shown
+from multimodal_to.ocp.integration import Interval
+from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.parameters import Parameters
+
+KnotFunction = Callable[[Knot, Parameters], SX]
+IntervalFunction = Callable[[Interval, Parameters], SX]
+Limit = float | Callable[[Parameters], float]
+"""A number, or a function of the parameters for one that the robot or the scenario says."""
+Labels = tuple[str, ...] | Callable[[Parameters], tuple[str, ...]]
+"""The names of a term's rows, or a function of the parameters where the robot says how many there are."""
+
+
+class Where(Enum):
+    """Where on the horizon a term holds or is charged."""
+
+    FIRST_KNOT = "first knot"
+    LATER_KNOTS = "every knot but the first"
+    EVERY_KNOT = "every knot"
+    """The first one only where the motion starts in the air: a standing start gives the whole posture."""
+    LAST_KNOT = "last knot"
+    EVERY_INTERVAL = "every interval"
+    LAST_INTERVAL = "last interval"
+
+    @property
+    def of_intervals(self) -> bool:
+        """Return whether a term there is a function of an interval."""
+        return self in (Where.EVERY_INTERVAL, Where.LAST_INTERVAL)
+
+
+@dataclass(frozen=True)
+class Within:
+    """The set that a constraint keeps its rows in: lower ≤ row ≤ upper."""
+
+    lower: Limit
+    upper: Limit
+
+    def limits(self, parameters: Parameters) -> tuple[float, float]:
+        """Return the two numbers."""
+        lower, upper = (
+            float(limit(parameters)) if callable(limit) else float(limit) for limit in (self.lower, self.upper)
+        )
+        return lower, upper
+
+
+def equal(value: Limit = 0.0) -> Within:
+    """Return the set of one value."""
+    return Within(value, value)
+
+
+def at_least(value: Limit) -> Within:
+    """Return the set of what is no smaller than a value."""
+    return Within(value, math.inf)
+
+
+def at_most(value: Limit) -> Within:
+    """Return the set of what is no greater than a value."""
+    return Within(-math.inf, value)
+
+
+def between(lower: Limit, upper: Limit) -> Within:
+    """Return the set of what lies between two values."""
+    return Within(lower, upper)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rows:
+    """The rows of a constraint at one place: lower ≤ expression ≤ upper, and how to speak of them."""
+
+    expression: SX  # (m, 1)
+    lower: float
+    upper: float
+    units: tuple[str, ...]  # of each row
+    scale: float  # the size that the solver sees as one
+    components: tuple[str, ...]  # the name of each row among them
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constraint:
+    """Rows of a function that have to lie in a set.
+
+    Args:
+        value: what has to lie in the set: a function of a knot, or of an interval where `holds` says so.
+        within: the set: `equal()`, `at_least(...)`, `at_most(...)` or `between(...)`.
+        unit: of the rows, such as `"m"`, `"N m"` or `"1"`; a tuple gives each row its own.
+        name: in every report; by default the function's.
+        holds: one place, or several.
+        scale: the size that the solver takes for one [unit].
+        labels: names of the rows, as `("x", "y", "z")`; by default their numbers.
+        when: for which problems the constraint exists; by default for all.
+        rigid: `relax` does not let the rows give way unless it is told to.
+
+    Raises:
+        FormulationError: something of this is not what it should be.
+    """
+
+    value: KnotFunction | IntervalFunction
+    within: Within
+    unit: str | tuple[str, ...]
+    name: str = ""
+    holds: Where | tuple[Where, ...] = Where.EVERY_KNOT
+    scale: float = 1.0
+    labels: Labels = ()
+    when: Callable[[Parameters], bool] | None = None
+    rigid: bool = False
+
+    def __post_init__(self) -> None:
+        _complete(self, self.value, "holds")
+        if not isinstance(self.within, Within):
+            raise _wrong(self.name, f"'within' is {shown(self.within)}", "equal(), at_least(), at_most() or between()")
+
+    @property
+    def formula(self) -> str:
+        """Return what the function says of itself."""
+        return (self.value.__doc__ or "").strip()
+
+    @property
+    def places(self) -> tuple[Where, ...]:
+        """Return where the constraint holds."""
+        return self.holds if isinstance(self.holds, tuple) else (self.holds,)
+
+    def rows(self, at: Knot | Interval, parameters: Parameters) -> Rows:
+        """Return the rows at a knot or over an interval.
+
+        Raises:
+            FormulationError: the function fails, or what it returns is not (m, 1), or a limit is no number.
+        """
+        expression = _evaluated(self.name, self.value, at, parameters)
+        count = int(expression.shape[0])
+        lower, upper = self.within.limits(parameters)
+        if not lower <= upper:
+            raise _wrong(self.name, f"the set is {lower:g} to {upper:g}", "numbers that do not fall")
+        labels = self.labels(parameters) if callable(self.labels) else self.labels
+        if not labels:
+            labels = tuple(str(index) for index in range(1, count + 1)) if count > 1 else ("",) * count
+        units = (self.unit,) * count if isinstance(self.unit, str) else self.unit
+        for kind, given in (("labels", labels), ("units", units)):
+            if len(given) != count:
+                raise _wrong(self.name, f"there are {len(given)} {kind} for {count} rows", "one for each row")
+        return Rows(
+            expression=expression, lower=lower, upper=upper, units=units, scale=self.scale, components=tuple(labels)
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cost:
+    """Weight × |residual|², charged at knots or over intervals, per second or once.
+
+    Args:
+        residual: what should be small: a function of a knot, or of an interval where `charged` says so.
+        weight: a number of at least zero, or a function of the parameters that returns one number, or one for each row;
+            a weight of zero leaves the cost out.
+        unit: of the residual, such as `"rad/s"`; a tuple gives each row its own.
+        name: in every report; by default the function's.
+        charged: one place, or several.
+        per_second: whether each charge is multiplied by Δt, so that the sum is an integral over time.
+        scale: the size of the residual that `doctor` weighs it by [unit].
+        when: for which problems the cost exists; by default for all.
+
+    Raises:
+        FormulationError: something of this is not what it should be.
+    """
+
+    residual: KnotFunction | IntervalFunction
+    weight: float | Callable[[Parameters], float | Array]
+    unit: str | tuple[str, ...]
+    name: str = ""
+    charged: Where | tuple[Where, ...] = Where.LATER_KNOTS
+    per_second: bool = True
+    scale: float = 1.0
+    when: Callable[[Parameters], bool] | None = None
+
+    def __post_init__(self) -> None:
+        _complete(self, self.residual, "charged")
+        if not (callable(self.weight) or (isinstance(self.weight, int | float) and 0 <= self.weight < math.inf)):
+            raise _wrong(self.name, f"the weight is {shown(self.weight)}", "a number of at least zero, or a function")
+
+    @property
+    def formula(self) -> str:
+        """Return what the function says of itself."""
+        return (self.residual.__doc__ or "").strip()
+
+    @property
+    def places(self) -> tuple[Where, ...]:
+        """Return where the cost is charged."""
+        return self.charged if isinstance(self.charged, tuple) else (self.charged,)
+
+    def weights(self, parameters: Parameters) -> float | Array:
+        """Return the weight: one number, or one for each row of the residual.
+
+        Raises:
+            FormulationError: it is no number of at least zero.
+        """
+        weight = self.weight(parameters) if callable(self.weight) else self.weight
+        numbers = np.asarray(weight, dtype=float)
+        if not (np.isfinite(numbers).all() and (numbers >= 0).all()):
+            raise _wrong(self.name, f"the weight is {shown(weight)}", "numbers of at least zero")
+        return numbers if numbers.ndim else float(numbers)
+
+    def charge(self, at: Knot | Interval, parameters: Parameters) -> SX:
+        """Return weight × |residual|² at a knot or over an interval, (1, 1), without Δt.
+
+        Raises:
+            FormulationError: the function fails, or what it returns is not (m, 1), or has not one row for each weight.
+        """
+        residual = _evaluated(self.name, self.residual, at, parameters)
+        weight = self.weights(parameters)
+        if not isinstance(weight, float) and weight.shape != (residual.shape[0],):
+            raise _wrong(
+                self.name, f"there are weights of shape {weight.shape} for {residual.shape[0]} rows", "one for each row"
+            )
+        return cs.dot(cs.DM(weight) * residual, residual)
+
+
+Term = Constraint | Cost
+
+
+def _complete(term: Constraint | Cost, function: Any, place: str) -> None:
+    """Give a term its function's name where it has none, and check what every term has.
+
+    Raises:
+        FormulationError: something is not what it should be.
+    """
+    name = term.name or getattr(function, "__name__", "")
+    if not callable(function):
+        raise _wrong(term.name, f"what it asks for is {shown(function)}", "a function")
+    plain = isinstance(name, str) and name.isprintable() and name.strip() and "<" not in name  # no <lambda>
+    if not plain or len(name) > _LONGEST:
+        raise _wrong(name, "no report can call it that", f"name=... of at most {_LONGEST} printable characters")
+    object.__setattr__(term, "name", name)
+    places = term.places
+    if not places or not all(isinstance(entry, Where) for entry in places) or len(set(places)) < len(places):
+        raise _wrong(name, f"'{place}' is {shown(getattr(term, place))}", "different members of Where")
+    if len({entry.of_intervals for entry in places}) > 1:
+        raise _wrong(name, f"'{place}' names knots and intervals", "only knots, or only intervals")
+    if not (isinstance(term.scale, int | float) and 0 < term.scale < math.inf):
+        raise _wrong(name, f"the scale is {shown(term.scale)}", "a positive number")
+    for unit in (term.unit,) if isinstance(term.unit, str) else term.unit:
+        if not isinstance(unit, str) or not _UNIT.fullmatch(unit):
+            raise _wrong(name, f"the unit is {shown(unit)}", f"one made of {listed(_SYMBOLS)}, as 'm/s²' or 'N m'")
+
+
+def _evaluated(name: str, function: Callable[..., SX], at: Knot | Interval, parameters: Parameters) -> SX:
+    """Return what a term's function says, as an SX column."""
+    try:
+        value = function(at, parameters)
+    except MultimodalError as error:
+        raise FormulationError(f"the term '{name}': {error}") from error
+    except Exception as error:  # a user's own function may fail in any way; its own words say how
+        raise FormulationError(f"the term '{name}' fails: {type(error).__name__}: {error}") from error
+    try:
+        column = cs.SX(value)
+    except Exception as error:  # CasADi has no type of its own for this
+        raise _wrong(name, f"the function returns {shown(value)}", "a CasADi column, (m, 1)") from error
+    if column.shape[1] != 1:
+        raise _wrong(name, f"the function returns the shape {tuple(column.shape)}", "a column, (m, 1)")
+    return column
+
+
+def _wrong(name: object, found: str, expected: str) -> FormulationError:
+    return FormulationError(f"the term {shown(name)}: {found}; expected {expected}")
+
+
+_LONGEST = 60
+"""Characters of a term's name, which stands in tables and progress lines."""
+_SYMBOLS = ("m", "s", "kg", "N", "rad", "J", "W", "1", "%")
+_POWERS = "(?:m|s|kg|N|rad|J|W)[²³⁴]?"
+_UNIT = re.compile(f"(?:1|%|{_POWERS}(?: {_POWERS})*)(?:/{_POWERS}(?: {_POWERS})*)?")

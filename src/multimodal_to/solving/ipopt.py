@@ -1,0 +1,276 @@
+"""`Ipopt`: how a problem is solved by default."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import casadi as cs
+import numpy as np
+
+from multimodal_to.adam.spatial import Array
+from multimodal_to.errors import InputError, SolverError
+from multimodal_to.ocp.problem import Problem
+from multimodal_to.solving import linear_solvers, machine
+from multimodal_to.solving.solver import Ending, StartPoint, Watch
+from multimodal_to.solving.status import Status
+
+_IPOPT_STATUS = {
+    "Solve_Succeeded": Status.OPTIMAL,
+    "Solved_To_Acceptable_Level": Status.ACCEPTABLE,
+    "Feasible_Point_Found": Status.ACCEPTABLE,
+    "Maximum_Iterations_Exceeded": Status.ITERATION_LIMIT,
+    "Maximum_WallTime_Exceeded": Status.TIME_LIMIT,
+    "Maximum_CpuTime_Exceeded": Status.TIME_LIMIT,
+    "User_Requested_Stop": Status.STOPPED,
+    "Infeasible_Problem_Detected": Status.INFEASIBLE,
+}
+
+
+_ROUGH_PUSH = 0.1
+"""How far the start guess is moved inside its bounds, in solver units and as a share of their distance."""
+
+
+_WARM_PUSH = 1e-6
+"""The same for an answer to start from, which touches its bounds."""
+
+
+_BARRIER_TOLERANCE = 50.0
+"""How loosely a barrier problem is solved before the next: in multiples of its parameter; IPOPT's own is 10."""
+
+
+class Pass(Enum):
+    """A run of IPOPT: what it starts from, and with which Hessian."""
+
+    ROUGH = "rough"
+    """From a start guess, without the curvature of the rows."""
+    EXACT = "exact"
+    """From where the rough pass ended."""
+    WARM = "warm"
+    """From the answer of a problem much like this one, with little of the barrier left."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ipopt:
+    """IPOPT: a monotone barrier on exact derivatives, in two passes.
+
+    The rough pass leaves the curvature of the rows out of the Hessian. What is left is convex, so that a step takes
+    one factorisation and is long, and a start guess that meets hardly any row becomes a motion that nearly meets them.
+    The exact pass goes on from there.
+
+    Raises:
+        InputError: an option is out of its range, or there is no linear solver of that name.
+    """
+
+    tolerance: float = 1e-4  # on the scaled optimality conditions
+    violation_tolerance: float = 1e-7  # on the rows, in solver units
+    max_iterations: int = 1000
+    time_limit: float = math.inf  # wall time [s]
+    rough_iterations: int = 20
+    objective_scale: float = 1e-4
+    """What the objective is multiplied by: it brings weights of 1e4 to 1e7, as the paper has them, near one.
+
+    An objective that weighs more keeps the steps short until the rows are met; one that weighs less leaves the contacts
+    where the start guess has them.
+    """
+    barrier_start: float = 0.1
+    barrier_warm: float = 1e-3  # where a solve that starts from an answer begins
+    linear_solver: str = linear_solvers.AUTO
+    """What factorises, one of `linear_solvers.LINEAR_SOLVERS`: by default an HSL solver that works, or MUMPS."""
+    hsl_library: str = ""  # file of the HSL library; empty: looked for
+
+    def __post_init__(self) -> None:
+        linear_solvers.check(self.linear_solver, self.hsl_library)
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            if not isinstance(value, str) and not value > 0:
+                raise InputError(f"{name} is {value}; expected a positive number")
+
+    def options(self, iterations: int, seconds: float, which: Pass) -> dict[str, Any]:
+        """Return IPOPT's own options for a pass within a budget.
+
+        Raises:
+            SolverError: the linear solver is not here, or does not work.
+        """
+        options: dict[str, Any] = {
+            "print_level": 0,
+            "sb": "yes",
+            **linear_solvers.choose(self.linear_solver, self.hsl_library).options(),
+            "fast_step_computation": "yes",
+            "mu_strategy": "monotone",
+            "barrier_tol_factor": _BARRIER_TOLERANCE,
+            "mu_init": self.barrier_warm if which is Pass.WARM else self.barrier_start,
+            "tol": self.tolerance,
+            "constr_viol_tol": self.violation_tolerance,
+            "compl_inf_tol": 1.0,  # in units of the cost, whose size is a million
+            "max_iter": min(iterations, self.rough_iterations) if which is Pass.ROUGH else iterations,
+            "nlp_scaling_method": "none",  # rows and variables come with their scales
+            "obj_scaling_factor": self.objective_scale,
+            "honor_original_bounds": "yes",
+        }
+        if math.isfinite(seconds):
+            options["max_wall_time"] = seconds
+        if which is Pass.ROUGH:
+            options |= dict.fromkeys(("bound_push", "bound_frac"), _ROUGH_PUSH)
+        if which is Pass.WARM:
+            options |= dict.fromkeys(("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"), _WARM_PUSH)
+        return options
+
+    @staticmethod
+    def status(return_status: str) -> Status:
+        """Return the status for what IPOPT says."""
+        return _IPOPT_STATUS.get(return_status, Status.FAILED)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Return the linear solver that factorises.
+
+        Raises:
+            SolverError: the linear solver is not here, or does not work.
+        """
+        return {"linear_solver": linear_solvers.choose(self.linear_solver, self.hsl_library).name}
+
+    def run(self, problem: Problem, start: StartPoint, watch: Watch) -> Ending:
+        """Minimise in the passes that the start needs; limits are for all of them together.
+
+        Raises:
+            SolverError: IPOPT could not be run, or its linear solver is not here.
+        """
+        started, iterations, x = time.perf_counter(), 0, start.x
+        for which in _passes(start):
+            seconds = max(self.time_limit - (time.perf_counter() - started), 1e-3)
+            options = self.options(max(self.max_iterations - iterations, 1), seconds, which)
+            x, statistics = _run(problem, x, options, _Watcher(problem, watch, iterations, which))
+            iterations += int(statistics["iter_count"])
+            message = str(statistics["return_status"])
+            status = self.status(message)
+            if status in (Status.TIME_LIMIT, Status.STOPPED) or iterations >= self.max_iterations:
+                break
+        return Ending(
+            x=x,
+            status=status,
+            iterations=iterations,
+            message=message,
+            label=which.value,
+            tolerance=self.violation_tolerance,
+            statistics=statistics,
+        )
+
+
+def _passes(start: StartPoint) -> tuple[Pass, ...]:
+    """Return the passes from a start: what no solve has made feasible goes on in the pass that it was in."""
+    if start.record is None:
+        return Pass.ROUGH, Pass.EXACT
+    if start.record.get("feasible") is not False:
+        return (Pass.WARM,)
+    before = start.record.get("pass", start.record.get("phase"))  # files of format versions up to 3 say phase
+    return (Pass.ROUGH, Pass.EXACT) if before == Pass.ROUGH.value else (Pass.EXACT,)
+
+
+@machine.one_blas_thread()
+@machine.memory_kept()
+def _run(problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher) -> tuple[Array, dict[str, Any]]:
+    """Run IPOPT once from x; return where it ended, answer or not, and its statistics."""
+    opti = problem.opti.copy()  # goes with its solver and memory when this solve ends
+    options: dict[str, Any] = {
+        "print_time": False,
+        "record_time": True,
+        "detect_simple_bounds": True,
+        "jac_g": problem.nlp.jacobian,
+        "grad_f": problem.nlp.gradient,
+        "hess_lag": problem.nlp.cost_hessian if watcher.which is Pass.ROUGH else problem.nlp.hessian,
+        "iteration_callback": watcher,
+    }
+    opti.solver("ipopt", options, ipopt_options)
+    opti.set_initial(opti.x, x)
+    failure: RuntimeError | None = None
+    try:
+        opti.solve_limited()
+    except RuntimeError as error:  # how Opti says that there is no solution, and everything else
+        failure = error
+    if watcher.error is not None:
+        raise watcher.error
+    try:
+        statistics = dict(opti.debug.stats())
+    except RuntimeError:  # no solver has run
+        raise SolverError(f"the solver did not run: {failure}") from failure
+    _check_bounds(problem, statistics)
+    if watcher.stopped:
+        statistics["return_status"] = "User_Requested_Stop"  # also where a second Ctrl-C broke an evaluation off
+    return np.array(opti.debug.value(opti.x)).ravel(), statistics
+
+
+def _check_bounds(problem: Problem, statistics: dict[str, Any]) -> None:
+    """Make sure that CasADi took the bounds, and nothing but the bounds, out of the rows.
+
+    The derivative functions are those of the remaining rows; were others left, the solver would work on wrong ones.
+    """
+    found = np.array(statistics["detect_simple_bounds_is_simple"], dtype=bool)
+    expected = np.arange(found.size) < problem.lower.size
+    if not np.array_equal(found, expected):
+        raise SolverError(f"CasADi took {found.sum()} rows for bounds, where {expected.sum()} are")
+
+
+class _Watcher(cs.Callback):  # type: ignore[misc]
+    """CasADi's iteration callback: shows every iterate to `watch`, and stops the pass when asked."""
+
+    def __init__(self, problem: Problem, watch: Watch, iteration: int, which: Pass) -> None:
+        cs.Callback.__init__(self)
+        self._problem, self._watch, self._iteration = problem, watch, iteration
+        self._rows_first: bool | None = None
+        self.which, self.stopped = which, False
+        self.error: Exception | None = None
+        self.construct("watcher")
+
+    def get_n_in(self) -> int:
+        return int(cs.nlpsol_n_out())
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_name_in(self, index: int) -> str:
+        return str(cs.nlpsol_out(index))
+
+    def get_sparsity_in(self, index: int) -> cs.Sparsity:
+        variables = self._problem.lower.size
+        rows = variables + self._problem.row_lower.size  # Opti counts the bounds among them
+        sizes = {"f": 1, "x": variables, "lam_x": variables, "g": rows, "lam_g": rows, "lam_p": 0}
+        return cs.Sparsity.dense(sizes.get(cs.nlpsol_out(index), 0), 1)
+
+    def eval(self, arguments: list[Any]) -> list[int]:
+        try:
+            self.stopped = self._show(arguments)
+        except KeyboardInterrupt:  # the second Ctrl-C
+            self.stopped = True
+        except Exception as error:  # it is raised once the solver has returned
+            self.error, self.stopped = error, True
+        return [int(self.stopped)]
+
+    def _show(self, arguments: list[Any]) -> bool:
+        values = dict(zip((cs.nlpsol_out(index) for index in range(len(arguments))), arguments, strict=True))
+        x = values["x"].full().ravel()
+        rows = self._rows(x, values["g"])
+        self._iteration += 1
+        return self._watch(
+            x,
+            iteration=self._iteration - 1,
+            rows=rows,
+            objective=float(values["f"]),
+            label=self.which.value,
+        )
+
+    def _rows(self, x: Array, g: cs.DM) -> Array:
+        """Return the rows at x, without evaluating them again where CasADi hands them over.
+
+        With bounds taken out of g, it leaves the rows in the first places of g and nothing in the others. That is not
+        documented, so it is looked at in the first iterate.
+        """
+        if self._rows_first is False:
+            return self._problem.rows_at(x)
+        first: Array = g[: self._problem.row_lower.size].full().ravel()
+        if self._rows_first is None:
+            self._rows_first = np.allclose(first, self._problem.rows_at(x), rtol=0.0, atol=1e-9)
+        return first if self._rows_first else self._problem.rows_at(x)
