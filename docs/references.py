@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
@@ -16,8 +17,11 @@ from types import MappingProxyType
 from multimodal_to.adam import urdf
 from multimodal_to.auditing import PROPERTIES, Judged, Property
 from multimodal_to.files.reading import LARGEST_TOML
+from multimodal_to.models.robot import load_robot
 from multimodal_to.models.terrain import MOST_NODES
+from multimodal_to.ocp import Constraint, Cost, Formulation, Parameters
 from multimodal_to.replay.meshes import LARGEST_MESH
+from multimodal_to.scenarios import SCENARIOS
 from multimodal_to.scenarios.scenario import MOST_KNOTS
 from multimodal_to.trajectory import ENTRIES, FORMATS, QUANTITIES, archive
 
@@ -148,6 +152,71 @@ def _limit(entry: Property) -> str:
     return text
 
 
+# ---------------------------------------------------------------- the formulation
+
+
+def terms() -> str:
+    """Return the terms of the paper's formulation: constraints and costs, each with its formula."""
+    formulation = Formulation.paper()
+    robot = load_robot("ironcub")
+    tasks = {
+        name: Parameters.of(robot, make(), robot.home) for name, make in SCENARIOS.items()
+    }  # what terms ask for that the robot or the scenario says
+    constraints = table(
+        ("constraint", "formula", "set", "unit", "where"),
+        [
+            (f"`{term.name}`", _formula(term), _set(term, tasks["take-off"]), _units(term), _places(term, tasks))
+            for term in formulation.constraints
+        ],
+    )
+    costs = table(
+        ("cost", "residual", "unit", "charged", "how"),
+        [
+            (
+                f"`{term.name}`",
+                _formula(term),
+                _units(term),
+                _places(term, tasks),
+                "per second" if term.per_second else "once",
+            )
+            for term in formulation.costs
+        ],
+    )
+    return (
+        f"## Constraints\n\n{constraints}\n\n## Costs\n\nA cost adds weight × |residual|² to the objective. If it is "
+        "charged per second, it is multiplied by Δt. The weight is the key of the same name in `weights` of the "
+        f"scenario.\n\n{costs}"
+    )
+
+
+def _formula(term: Constraint | Cost) -> str:
+    """Return the first paragraph of what a term's function says of itself."""
+    return " ".join(term.formula.split("\n\n")[0].split()).removesuffix(".")
+
+
+def _units(term: Constraint | Cost) -> str:
+    return term.unit if isinstance(term.unit, str) else ", ".join(dict.fromkeys(term.unit))
+
+
+def _set(term: Constraint, parameters: Parameters) -> str:
+    """Return the set of a constraint; a limit that the robot or the scenario says is that of the take-off."""
+    lower, upper = term.within.limits(parameters)
+    said = " (the scenario's)" if callable(term.within.lower) or callable(term.within.upper) else ""
+    if lower == upper:
+        return f"= {lower:g}{said}"
+    if upper == math.inf:
+        return f"≥ {lower:g}{said}"
+    return f"≤ {upper:g}{said}" if lower == -math.inf else f"{lower:g} to {upper:g}{said}"
+
+
+def _places(term: Constraint | Cost, tasks: Mapping[str, Parameters]) -> str:
+    """Return where a term holds, and in which bundled scenarios if not in all."""
+    text = ", ".join(place.value for place in term.places)
+    if term.when is None:
+        return text
+    return f"{text}; in {', '.join(name for name, parameters in tasks.items() if term.when(parameters))}"
+
+
 # ---------------------------------------------------------------- the rooms
 
 _LAYERING = Path(__file__).parents[1] / "tests" / "test_layering.py"
@@ -211,6 +280,7 @@ TABLES: Mapping[str, Callable[[], str]] = MappingProxyType(
         "formats": formats,
         "limits": limits,
         "properties": properties,
+        "terms": terms,
         "rooms": rooms,
         "rooms picture": rooms_picture,
     }

@@ -145,3 +145,11 @@ def test_the_files_that_the_pages_name_exist():
             if not any((place / name).exists() for place in places) and not name.startswith(("hopper/", "results/")):
                 missing.append(f"{page.name}: {name}")
     assert missing == []
+
+
+def test_every_term_of_the_paper_is_on_its_page_with_its_formula():
+    text = filled("reference/terms.md")
+    for term in mt.Formulation.paper().terms:
+        row = next(line for line in text.splitlines() if line.startswith(f"| `{term.name}` |"))
+        assert term.formula.split("\n")[0].removesuffix(".").replace("|", r"\|") in row
+        assert all(place.value in row for place in term.places)
