@@ -165,9 +165,13 @@ BROKEN = {
     "half a scenario": toml("title = 'half'", "the scenario lacks", "'knots'"),
     # robots
     "a URDF elsewhere": robot('"ironcub.urdf"', '"../../ironcub.urdf"', "'urdf' is", "outside the robot's folder"),
-    "a robot's unknown key": robot("friction = 0.33", "friction = 0.33\nfriktion = 1", "did you mean 'friction'?"),
+    "a robot's unknown key": robot(
+        "friction = 0.33", "friction = 0.33\nfriktion = 1", "did you mean 'contact.friction'?"
+    ),
     "a joint that is not there": robot("torso_pitch ", "torso_pich ", "unknown joint 'torso_pich'", "'torso_pitch'"),
-    "a robot's number beyond floats": robot("friction = 0.33", f"friction = {10**400}", "'friction'", "finite number"),
+    "a robot's number beyond floats": robot(
+        "friction = 0.33", f"friction = {10**400}", "'contact.friction'", "finite number"
+    ),
     "an unknown robot": Broken(
         command="solve take-off --robot ironcup --output out/new", error=ModelError, says=("did you mean 'ironcub'?",)
     ),

@@ -61,11 +61,11 @@ def test_only_regular_files_within_the_limit_are_read(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('package = "icub-models"', "package = 3", "'package' in the top level is 3; expected a text"),
-        ('root = "root_link"', "", "lacks 'root'"),
+        ('package = "icub-models"', "package = 3", "'package' is 3; expected a text"),
+        ('root = "root_link"', "", "the dress lacks 'root'"),
         ("kept = [", "kpt = []\nkept = [", "unknown key 'kpt'; did you mean 'kept'?"),
-        ("[[garment]]", "[[garment]]\ncolour = 1", "unknown key 'colour'"),
-        ("[[garment]]", "[[garment]]\nrgba = [1, 0, nan, 1]", "'rgba' in [[garment]] number 1 is [1, 0, nan, 1]"),
+        ("[[garment]]", "[[garment]]\ncolour = 1", "unknown key 'garment[0].colour'"),
+        ("[[garment]]", "[[garment]]\nrgba = [1, 0, nan, 1]", "'garment[0].rgba[2]' is nan; expected a finite number"),
     ],
 )
 def test_a_broken_dress_says_what_is_wrong(tmp_path, old, new, says):

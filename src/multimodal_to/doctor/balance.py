@@ -101,7 +101,14 @@ def lever_of(robot: Robot) -> float:
 
 
 def knot_of(task: Task, posture: Posture, forces: cs.SX, thrust: cs.SX) -> Knot:
-    """Return a knot at rest in a posture, with contact forces [N] and thrusts [N] as symbols."""
+    """Return a knot at rest in a posture, with contact forces [N] and thrusts [N] as symbols.
+
+    Args:
+        task: robot and scenario.
+        posture: where everything is.
+        forces: contact forces on the robot [N], (3 contacts, 1), world.
+        thrust: of each jet [N], (jets, 1).
+    """
     robot = task.robot
     count, jets = len(robot.joint_names), len(robot.jets)
     return Knot(

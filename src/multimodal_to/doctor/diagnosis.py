@@ -51,15 +51,33 @@ class Diagnosis:
 
 
 def error(name: str, found: str, change: str) -> Symptom:
-    """Return a symptom that makes the task hopeless."""
+    """Return a symptom that makes the task hopeless.
+
+    Args:
+        name: which check found it.
+        found: what is wrong, with numbers and units.
+        change: what to do about it.
+    """
     return Symptom(name=name, severity=Severity.ERROR, found=found, change=change)
 
 
 def warning(name: str, found: str, change: str) -> Symptom:
-    """Return a symptom that may make the solve fail."""
+    """Return a symptom that may make the solve fail.
+
+    Args:
+        name: which check found it.
+        found: what may go wrong, with numbers and units.
+        change: what to do about it.
+    """
     return Symptom(name=name, severity=Severity.WARNING, found=found, change=change)
 
 
 def note(name: str, found: str, change: str = "") -> Symptom:
-    """Return something worth knowing."""
+    """Return something worth knowing.
+
+    Args:
+        name: which check found it.
+        found: what is so, with numbers and units.
+        change: what may be done about it.
+    """
     return Symptom(name=name, severity=Severity.NOTE, found=found, change=change)

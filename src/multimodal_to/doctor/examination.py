@@ -62,5 +62,11 @@ def doctor(robot: Robot, scenario: Scenario, formulation: Formulation | None = N
 
 
 def refusal(name: str, found: str | MultimodalError, change: str = "") -> Diagnosis:
-    """Return the diagnosis of a task that cannot even be looked at."""
+    """Return the diagnosis of a task that cannot even be looked at.
+
+    Args:
+        name: what is wrong in a word.
+        found: what is wrong, or the error that says so.
+        change: what to do about it.
+    """
     return Diagnosis(findings=(error(name, str(found), change),))

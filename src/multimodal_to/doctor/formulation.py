@@ -54,7 +54,14 @@ def _crossed(task: Task, outline: Outline) -> Iterator[Symptom]:
 
 
 def _unseen(task: Task, layout: Layout, bounds: Bounds, stages: list[NamedStage]) -> Iterator[Symptom]:
-    """Name the variables that are free and that no row and no cost sees but their own integration."""
+    """Name the variables that are free and that no row and no cost sees but their own integration.
+
+    Args:
+        task: robot and scenario.
+        layout: where each variable stands in a knot.
+        bounds: of the variables at every knot; one that is fixed everywhere is not free.
+        stages: the parts of the problem with their rows and costs.
+    """
     seen, ties = np.zeros(layout.size, dtype=bool), list[NDArray[np.int64]]()
     for named in stages:
         for columns, integration in _dependencies(named, layout.size):

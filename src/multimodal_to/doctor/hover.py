@@ -69,7 +69,13 @@ def upright(task: Task) -> Posture:
 
 
 def _impossible(task: Task, posture: Posture, here: Residual) -> str:
-    """Return why no posture can hover, where that is certain: what the jets point at does not depend on the joints."""
+    """Return why no posture can hover, where that is certain: what the jets point at does not depend on the joints.
+
+    Args:
+        task: robot and scenario.
+        posture: upright.
+        here: what the thrusts leave over in it, with a long lever.
+    """
     tree = task.robot.kindyn.tree
     if task.rigid and residual(task, posture, feet=False, thrusts=task.thrusts_held).share > _SLACK:
         return f"no joint moves, and within their limits the thrusts leave {here} over"

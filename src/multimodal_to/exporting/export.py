@@ -37,7 +37,13 @@ def columns(trajectory: Trajectory) -> dict[str, tuple[str, Array]]:
 
 
 def write_csv(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
-    """Write one row for each knot; lines that start with # say the conventions, the first other one names and units."""
+    """Write one row for each knot; lines that start with # say the conventions, the first other one names and units.
+
+    Args:
+        robot: the robot of the trajectory; not used.
+        trajectory: the motion.
+        path: of the file, by convention `.csv`.
+    """
     table = columns(trajectory)
     with whole(path) as draft, draft.open("w", encoding="utf-8", newline="") as stream:
         for line in (f"robot {trajectory.robot}, scenario {trajectory.scenario}", *CONVENTIONS):
@@ -50,6 +56,11 @@ def write_csv(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
 
 def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
     """Write a MATLAB file (version 5): every quantity, (rows, knots + 1), names as cells, units as a struct.
+
+    Args:
+        robot: the robot of the trajectory; not used.
+        trajectory: the motion.
+        path: of the file, by convention `.mat`.
 
     Raises:
         OutputError: SciPy is not installed, or the file cannot be written.
@@ -77,6 +88,11 @@ def write_mujoco(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[s
 
     qpos = (p, quaternion w x y z, s); qvel = (ṗ in world axes, ω in the base's axes, ṡ); ctrl = (joint torques by
     inverse dynamics [N m], thrusts [N]). Joints and jets are in the order of `joint_names` and `jet_names`.
+
+    Args:
+        robot: the robot of the trajectory, for the torques.
+        trajectory: the motion.
+        path: of the file, by convention `.npz`.
     """
     parts = {
         "qpos": [trajectory.base_position, _unit_quaternions(trajectory)[[3, 0, 1, 2]], trajectory.joint_positions],
@@ -105,6 +121,11 @@ def write_pinocchio(robot: Robot, trajectory: Trajectory, path: str | os.PathLik
 
     q = (p, quaternion x y z w, s); v = (ṗ and ω, both in the base's axes, ṡ); tau = joint torques by inverse dynamics
     [N m]. Joints are in the order of `joint_names`, which need not be that of a Pinocchio model.
+
+    Args:
+        robot: the robot of the trajectory, for the torques.
+        trajectory: the motion.
+        path: of the file, by convention `.npz`.
     """
     parts = {
         "q": [trajectory.base_position, _unit_quaternions(trajectory), trajectory.joint_positions],

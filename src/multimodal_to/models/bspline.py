@@ -35,6 +35,11 @@ def evaluate(c: Array, u: SX, v: SX) -> tuple[SX, SX, SX]:
 
     The sixteen coefficients around a point are picked by sums with 0 and 1, whose derivatives vanish: about 10 n m
     operations for a grid of n by m nodes, and none of them again in any derivative.
+
+    Args:
+        c: coefficients of the spline, (n + 2, m + 2), as `coefficients` returns them.
+        u: where, along the first axis, in units of the grid.
+        v: where, along the second axis, in units of the grid.
     """
     here, along_u, slope_u = _weights(u, c.shape[0] - 2)
     there, along_v, slope_v = _weights(v, c.shape[1] - 2)

@@ -33,7 +33,13 @@ class FrictionCone(Enum):
 
 
 def normal_force(surface: Surface, point: SX, force: SX) -> SX:
-    """Return n(p)ᵀ f [N]."""
+    """Return n(p)ᵀ f [N].
+
+    Args:
+        surface: the ground.
+        point: where the force acts [m], (3, 1), world.
+        force: on the robot [N], (3, 1), world.
+    """
     return cs.dot(surface.normal(point), force)
 
 
@@ -41,6 +47,12 @@ def friction_pyramid(surface: Surface, point: SX, force: SX, friction: float) ->
     """Return the four distances to the faces of the pyramid [N], (4, 1), none negative inside: μ n·f ∓ t·f (eq. 12).
 
     All of them together also make the normal force non-negative.
+
+    Args:
+        surface: the ground.
+        point: where the force acts [m], (3, 1), world.
+        force: on the robot [N], (3, 1), world.
+        friction: μ [1].
     """
     along = surface.tangents(point).T @ force
     reach = friction * normal_force(surface, point, force)
@@ -56,6 +68,12 @@ def friction_cone(surface: Surface, point: SX, force: SX, friction: float) -> SX
 
     Polynomial in the force, so smooth at f = 0 as well, where the norm itself is not; the first row chooses between the
     two cones of the second.
+
+    Args:
+        surface: the ground.
+        point: where the force acts [m], (3, 1), world.
+        force: on the robot [N], (3, 1), world.
+        friction: μ [1].
     """
     along, normal = surface.tangents(point).T @ force, normal_force(surface, point, force)
     return cs.vertcat(normal, ((friction * normal) ** 2 - cs.sumsqr(along)) / CONE_FORCE)
@@ -68,10 +86,23 @@ FACES = {FrictionCone.PYRAMID: ("+x", "+y", "-x", "-y"), FrictionCone.SECOND_ORD
 
 
 def complementarity(surface: Surface, point: SX, force: SX) -> SX:
-    """Return d(p) n(p)ᵀ f [N m]: zero when no force acts on a point in the air (eq. 10)."""
+    """Return d(p) n(p)ᵀ f [N m]: zero when no force acts on a point in the air (eq. 10).
+
+    Args:
+        surface: the ground.
+        point: where the force acts [m], (3, 1), world.
+        force: on the robot [N], (3, 1), world.
+    """
     return surface.distance(point) * normal_force(surface, point, force)
 
 
 def sliding(surface: Surface, point: SX, force: SX, displacement: SX) -> SX:
-    """Return t(p)ᵀ Δp n(p)ᵀ f [N m], (2, 1): zero when a loaded point stays where it is (eq. 11)."""
+    """Return t(p)ᵀ Δp n(p)ᵀ f [N m], (2, 1): zero when a loaded point stays where it is (eq. 11).
+
+    Args:
+        surface: the ground.
+        point: where the force acts [m], (3, 1), world.
+        force: on the robot [N], (3, 1), world.
+        displacement: Δp, how far the point moved over the interval [m], (3, 1), world.
+    """
     return surface.tangents(point).T @ displacement * normal_force(surface, point, force)

@@ -22,18 +22,34 @@ class JetModel:
     """
 
     K_T: float
+    """Coefficient of T in T̈ [1/s²]."""
     K_TT: float
+    """Coefficient of T² in T̈ [1/(N s²)]."""
     K_D: float
+    """Coefficient of Ṫ in T̈ [1/s]."""
     K_DD: float
+    """Coefficient of Ṫ² in T̈ [1/N]."""
     K_TD: float
+    """Coefficient of T Ṫ in T̈ [1/(N s)]."""
     B_U: float
+    """Coefficient of the input in T̈ [N/(% s²)]."""
     B_T: float
+    """Coefficient of T × the input in T̈ [1/(% s²)]."""
     B_D: float
+    """Coefficient of Ṫ × the input in T̈ [1/(% s)]."""
     B_UU: float
+    """Coefficient of u² in the input u + B_UU u² [1/%]."""
     c: float
+    """Constant part of T̈ [N/s²]."""
 
     def acceleration(self, thrust: SX, thrust_rate: SX, throttle: SX) -> SX:
-        """Return T̈ [N/s²]."""
+        """Return T̈ [N/s²].
+
+        Args:
+            thrust: T [N].
+            thrust_rate: Ṫ [N/s].
+            throttle: u [%].
+        """
         drift = (
             self.K_T * thrust
             + self.K_TT * thrust**2

@@ -15,14 +15,17 @@ import numpy as np
 
 from multimodal_to.adam import KinDynComputations, quaternion
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import ModelError, MultimodalError, listed, shown, unknown
-from multimodal_to.files.reading import Table, read_toml
+from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
+from multimodal_to.files.reading import read_toml
+from multimodal_to.files.records import Records
 from multimodal_to.models import proportions
 from multimodal_to.models.contact import ContactPoint
-from multimodal_to.models.jet import Jet, JetModel
+from multimodal_to.models.jet import Jet
 from multimodal_to.models.proportions import Gait
+from multimodal_to.models.robot_keys import RobotFile
 
 ROBOT_FILE = "robot.toml"
+_RECORDS = Records(what="the robot", error=ModelError)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -150,92 +153,51 @@ def load_robot(robot: str | os.PathLike[str]) -> Robot:
     path = folder / ROBOT_FILE
     table = read_toml(path, ModelError)
     try:
-        return _robot(Table(table, "the top level", ModelError), folder)
+        return _robot(_RECORDS.read(RobotFile, table), folder)
     except MultimodalError as error:
         raise ModelError(f"{path}: {error}") from error
 
 
-def _robot(table: Table, folder: Path) -> Robot:
-    name, urdf = table.text("name"), folder / table.text("urdf")
+def _robot(file: RobotFile, folder: Path) -> Robot:
+    urdf, joint_names = folder / file.urdf, tuple(file.joints)
     if folder.resolve() not in urdf.resolve().parents:
         raise ModelError(f"'urdf' is '{urdf}', which is outside the robot's folder")
-    joints = table.table("joints")
-    joint_names = joints.names()
     kindyn = KinDynComputations(urdf, joint_names)
-    limits, home_joints = _joints(joints, joint_names, kindyn)
-    groups = table.table("joint_groups")
-    joint_groups = {group: groups.texts(group) for group in groups.names()}
-    for group, members in joint_groups.items():
-        for member in members:
-            if member not in joint_names:
-                raise ModelError(f"joint group '{group}': {unknown('joint', member, joint_names)}")
-    contact, home = table.table("contact"), table.table("home")
-    friction = contact.number("friction")
-    if friction <= 0:
-        raise ModelError(f"'friction' is {friction}; expected a positive number")
-    feet = contact.table("feet")
-    contacts = tuple(ContactPoint(frame=frame, foot=foot) for foot in feet.names() for frame in feet.texts(foot))
-    jets = _jets(table)
+    _check_groups(file)
+    contacts = tuple(
+        ContactPoint(frame=frame, foot=foot) for foot, frames in file.contact.feet.items() for frame in frames
+    )
+    jets = _jets(file)
     _refuse_repeated("contact point", [point.frame for point in contacts])
     _refuse_repeated("jet", [jet.name for jet in jets])
     for frame in (*(point.frame for point in contacts), *(jet.frame for jet in jets)):
         kindyn.tree.frame(frame)
-    quaternion = home.numbers("base_quaternion_xyzw", 4)
-    if abs(np.linalg.norm(quaternion) - 1) > 1e-3:
-        raise ModelError(f"'base_quaternion_xyzw' has the norm {np.linalg.norm(quaternion):.4f}; expected 1")
-    posture = Posture(
-        base_position=home.numbers("base_position", 3),
-        base_quaternion_xyzw=quaternion / np.linalg.norm(quaternion),
-        joint_positions=home_joints,
+    home = _home(file)
+    contact_reach, jet_reach, gait = _proportions(
+        file, *(_offsets(kindyn, home, [body.frame for body in bodies]) for bodies in (contacts, jets))
     )
-    contact_reach, jet_reach, gait = _proportions(table, kindyn, posture, contacts, jets)
-    for part in (contact, home, table):
-        part.done()
     return Robot(
-        name=name,
+        name=file.name,
         urdf=urdf,
         kindyn=kindyn,
-        joint_groups=MappingProxyType(joint_groups),
-        joint_limits=limits,
+        joint_groups=MappingProxyType(dict(file.joint_groups)),
+        joint_limits=_limits(file, kindyn),
         contacts=contacts,
-        friction=friction,
+        friction=file.contact.friction,
         jets=jets,
-        home=posture,
+        home=home,
         contact_reach=contact_reach,
         jet_reach=jet_reach,
         gait=gait,
     )
 
 
-def _proportions(
-    table: Table, kindyn: KinDynComputations, home: Posture, contacts: Sequence[ContactPoint], jets: Sequence[Jet]
-) -> tuple[Array, Array, Gait]:
-    """Return the reach of contact points and of jets [m], (3,) each, and the gait: as stated, else in units of L."""
-    reach, gait = (table.table(key) if key in table else Table({}, f"[{key}]", ModelError) for key in ("reach", "gait"))
-    points = _offsets(kindyn, home, [contact.frame for contact in contacts])
-    nozzles = _offsets(kindyn, home, [jet.frame for jet in jets])
-    height = proportions.standing_height(points, nozzles)
-    contact_reach = reach.numbers("contacts", 3, default=proportions.contact_reach(points, height))
-    jet_reach = reach.numbers("jets", 3, default=proportions.jet_reach(nozzles, height))
-    lift = gait.number("lift", default=proportions.LIFT * height)
-    swing = gait.number("swing", default=proportions.SWING)
-    for key, axes in (("contacts", contact_reach), ("jets", jet_reach)):
-        if min(axes) <= 0:
-            raise ModelError(f"'{key}' in [reach] is {shown(axes.tolist())}; expected three positive numbers [m]")
-    if lift <= 0:
-        raise ModelError(f"'lift' in [gait] is {lift}; expected a positive number [m]")
-    if not 0 < swing <= 1:
-        raise ModelError(f"'swing' in [gait] is {swing}; expected a number above 0 and at most 1")
-    reach.done()
-    gait.done()
-    return contact_reach, jet_reach, Gait(lift=lift, swing=swing)
-
-
-def _offsets(kindyn: KinDynComputations, posture: Posture, frames: Sequence[str]) -> Array:
-    """Return where frames are from the CoM in a posture, in world axes [m], (frames, 3)."""
-    com = np.array(kindyn.CoM_position(posture.base_transform, posture.joint_positions)).ravel()
-    poses = [kindyn.forward_kinematics(frame, posture.base_transform, posture.joint_positions) for frame in frames]
-    return np.array([np.array(pose)[:3, 3] - com for pose in poses]).reshape(-1, 3)
+def _check_groups(file: RobotFile) -> None:
+    for group, members in file.joint_groups.items():
+        for member in members:
+            if member not in file.joints:
+                raise ModelError(f"joint group '{group}': {unknown('joint', member, file.joints)}")
+        _refuse_repeated(f"joint group '{group}': joint", members)
 
 
 def _refuse_repeated(kind: str, names: Sequence[str]) -> None:
@@ -243,49 +205,68 @@ def _refuse_repeated(kind: str, names: Sequence[str]) -> None:
         raise ModelError(f"{kind} given twice: {listed(repeated)}")
 
 
-def _joints(joints: Table, names: Sequence[str], kindyn: KinDynComputations) -> tuple[JointLimits, Array]:
-    rows = []
-    for name in names:
-        entry = joints.table(name)
-        lower, upper, home = entry.number("lower"), entry.number("upper"), entry.number("home")
-        speed = entry.number("speed")
-        entry.done()
-        if not lower <= home <= upper:
-            raise ModelError(f"joint '{name}': home {home} is not within its range {lower} to {upper}")
-        if speed <= 0:
-            raise ModelError(f"joint '{name}': speed is {speed}; expected a positive number")
-        rows.append((lower, upper, speed, home))
-    columns = np.array(rows, dtype=float).reshape(-1, 4).T
-    effort = np.array([joint.effort for joint in kindyn.tree.joints])
-    return JointLimits(lower=columns[0], upper=columns[1], speed=columns[2], effort=effort), columns[3]
+def _limits(file: RobotFile, kindyn: KinDynComputations) -> JointLimits:
+    joints = file.joints.values()
+    return JointLimits(
+        lower=np.array([joint.lower for joint in joints]),
+        upper=np.array([joint.upper for joint in joints]),
+        speed=np.array([joint.speed for joint in joints]),
+        effort=np.array([joint.effort for joint in kindyn.tree.joints]),
+    )
 
 
-def _jets(table: Table) -> tuple[Jet, ...]:
-    coefficients = tuple(JetModel.__dataclass_fields__)
-    entries = table.tables("jet")
-    models: dict[str, JetModel] = {}
-    if entries:
-        known = table.table("jet_models")
-        for name in known.names():
-            entry = known.table(name)
-            models[name] = JetModel(**{key: entry.number(key) for key in coefficients})
-            entry.done()
+def _home(file: RobotFile) -> Posture:
+    quaternion_xyzw = np.array(file.home.base_quaternion_xyzw)
+    return Posture(
+        base_position=np.array(file.home.base_position),
+        base_quaternion_xyzw=quaternion_xyzw / np.linalg.norm(quaternion_xyzw),
+        joint_positions=np.array([joint.home for joint in file.joints.values()]),
+    )
+
+
+def _jets(file: RobotFile) -> tuple[Jet, ...]:
     jets = []
-    for entry in entries:
-        model = entry.text("model")
-        if model not in models:
-            raise ModelError(unknown("jet model", model, models))
-        throttle_min, throttle_max = entry.numbers("throttle", 2)
-        jet = Jet(
-            name=entry.text("name"),
-            frame=entry.text("frame"),
-            model=models[model],
-            thrust_max=entry.number("thrust_max"),
-            throttle_min=float(throttle_min),
-            throttle_max=float(throttle_max),
+    for entry in file.jet:
+        if entry.model not in file.jet_models:
+            raise ModelError(unknown("jet model", entry.model, file.jet_models))
+        jets.append(
+            Jet(
+                name=entry.name,
+                frame=entry.frame,
+                model=file.jet_models[entry.model],
+                thrust_max=entry.thrust_max,
+                throttle_min=entry.throttle[0],
+                throttle_max=entry.throttle[1],
+            )
         )
-        entry.done()
-        if not (jet.thrust_max > 0 and throttle_min < throttle_max):
-            raise ModelError(f"jet '{jet.name}': expected a positive thrust_max and a throttle range that rises")
-        jets.append(jet)
     return tuple(jets)
+
+
+def _proportions(file: RobotFile, contacts: Array, jets: Array) -> tuple[Array, Array, Gait]:
+    """Return the reach of contact points and of jets [m], (3,) each, and the gait: as stated, else in units of L.
+
+    Args:
+        file: what may state them.
+        contacts: offsets of the contact points from the CoM at home [m], (contacts, 3).
+        jets: offsets of the frames of the jets [m], (jets, 3).
+    """
+    stated, height = file.reach, proportions.standing_height(contacts, jets)
+    lift = proportions.LIFT * height if file.gait.lift is None else file.gait.lift
+    return (
+        proportions.contact_reach(contacts, height) if stated.contacts is None else np.array(stated.contacts),
+        proportions.jet_reach(jets, height) if stated.jets is None else np.array(stated.jets),
+        Gait(lift=lift, swing=file.gait.swing),
+    )
+
+
+def _offsets(kindyn: KinDynComputations, posture: Posture, frames: Sequence[str]) -> Array:
+    """Return where frames are from the CoM in a posture, in world axes [m], (frames, 3).
+
+    Args:
+        kindyn: kinematics of the robot.
+        posture: where it is.
+        frames: names of links or frames.
+    """
+    com = np.array(kindyn.CoM_position(posture.base_transform, posture.joint_positions)).ravel()
+    poses = [kindyn.forward_kinematics(frame, posture.base_transform, posture.joint_positions) for frame in frames]
+    return np.array([np.array(pose)[:3, 3] - com for pose in poses]).reshape(-1, 3)

@@ -43,7 +43,8 @@ class Surface(Protocol):
 class FlatGround:
     """The plane z = `height`."""
 
-    height: float = 0.0  # [m]
+    height: float = 0.0
+    """z of the ground [m]."""
 
     def distance(self, point: SX) -> SX:
         """Return the height of a point above the plane [m]."""
@@ -122,9 +123,12 @@ class Plane(Relief):
         InputError: a number is not finite, or the direction has no length.
     """
 
-    slope: float  # tangent of the inclination [1]
-    direction: Vector2 = (1.0, 0.0)  # horizontal, of any length
-    height: float = 0.0  # at the world's origin [m]
+    slope: float
+    """Tangent of the inclination [1]."""
+    direction: Vector2 = (1.0, 0.0)
+    """Where it rises to: horizontal x and y, of any length [1]."""
+    height: float = 0.0
+    """z of the plane at the world's origin [m]."""
 
     def __post_init__(self) -> None:
         _finite("slope", self.slope)
@@ -148,10 +152,14 @@ class Stairs(Relief):
         InputError: edges and heights don't fit, the edges don't increase, or ramps would overlap.
     """
 
-    edges: tuple[float, ...]  # distance from the world's origin along the direction [m]
-    heights: tuple[float, ...]  # of the treads, one more than edges [m]
-    direction: Vector2 = (1.0, 0.0)  # horizontal, of any length
-    width: float = 0.02  # of the ramp that smooths a riser [m]
+    edges: tuple[float, ...]
+    """Where the risers are: distances from the world's origin along the direction [m]."""
+    heights: tuple[float, ...]
+    """z of the treads, one more than edges [m]."""
+    direction: Vector2 = (1.0, 0.0)
+    """Which way the stairs go: horizontal x and y, of any length [1]."""
+    width: float = 0.02
+    """Width of the ramp that smooths a riser [m]."""
 
     def __post_init__(self) -> None:
         _unit(self.direction)
@@ -194,9 +202,12 @@ class HeightField(Relief):
             not rise.
     """
 
-    x_range: Vector2  # x of the first and last row of nodes [m]
-    y_range: Vector2  # y of the first and last column [m]
-    heights: tuple[tuple[float, ...], ...] = field(repr=False)  # [m], heights[i][j] at x_i and y_j
+    x_range: Vector2
+    """x of the first and of the last row of nodes [m]."""
+    y_range: Vector2
+    """y of the first and of the last column of nodes [m]."""
+    heights: tuple[tuple[float, ...], ...] = field(repr=False)
+    """z of the nodes, one list for each x and one number in it for each y [m]."""
 
     def __post_init__(self) -> None:
         for label, (low, high) in (("x_range", self.x_range), ("y_range", self.y_range)):
@@ -218,7 +229,14 @@ class HeightField(Relief):
     def sampled(
         cls, height: Callable[[float, float], float], *, x_range: Vector2, y_range: Vector2, spacing: float
     ) -> HeightField:
-        """Return the field of a function h(x, y) [m], sampled with nodes at most `spacing` [m] apart."""
+        """Return the field of a function h(x, y) [m], sampled with nodes at most `spacing` [m] apart.
+
+        Args:
+            height: h, of x and y [m].
+            x_range: least and greatest x of the nodes [m].
+            y_range: least and greatest y of the nodes [m].
+            spacing: greatest distance of neighbours [m].
+        """
         if not spacing > 0:
             raise InputError(f"spacing is {spacing} m; expected a positive number")
         x, y = (

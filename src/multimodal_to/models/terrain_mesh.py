@@ -26,7 +26,13 @@ class Patch:
 
 
 def patch(surface: Surface, middle: Array, half: float) -> Patch:
-    """Return the patch of a surface around `middle` (2,) that reaches `half` metres to each side, at whole cells."""
+    """Return the patch of a surface around `middle` (2,) that reaches `half` metres to each side, at whole cells.
+
+    Args:
+        surface: the ground.
+        middle: x and y of the middle in the world [m], (2,).
+        half: how far it reaches to each side at least [m].
+    """
     cells = int(np.ceil(half / (CELL * LINE_EVERY))) * LINE_EVERY
     steps = CELL * np.arange(-cells, cells + 1)
     corner = np.round(middle / (CELL * LINE_EVERY)) * CELL * LINE_EVERY

@@ -11,10 +11,44 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import ModelError, unknown
-from multimodal_to.files.reading import Table, read_toml
+from multimodal_to.files.reading import read_toml
+from multimodal_to.files.records import Records
 from multimodal_to.replay.meshes import package_file
 
 DRESS_FILE = "dress.toml"
+_RECORDS = Records(what="the dress", error=ModelError)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GarmentTable:
+    """One of the tables `[[garment]]`."""
+
+    link: str
+    """The robot's link that wears it."""
+    source: str | None = None
+    """The link of the other model whose meshes it is; where there is none, the one called like `link`."""
+    at: str | None = None
+    """The link, of both models, whose origins are made to meet; where there is none, `link`."""
+    rgba: tuple[float, float, float, float] | None = None
+    """Its colour, red, green, blue and opacity from 0 to 1 [1]; where there is none, the other model's colours."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DressFile:
+    """What a `dress.toml` holds: the only list of its keys."""
+
+    package: str
+    """The installed package that holds the other model."""
+    urdf: str
+    """Path of its URDF in the package, or the end of it."""
+    attribution: str
+    """Whose the meshes are; `{version}` becomes the package's version."""
+    root: str
+    """The link, of both models, that is put in one place."""
+    kept: tuple[str, ...]
+    """Visuals of the robot's own that stay on the links that wear something."""
+    garment: tuple[GarmentTable, ...] = ()
+    """What is worn."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,28 +124,22 @@ def read_dress(folder: Path) -> Dress | None:
     path = folder / DRESS_FILE
     if not path.is_file():
         return None
-    table = Table(read_toml(path, ModelError), "the top level", ModelError)
+    table = read_toml(path, ModelError)
     try:
-        return _dress(table)
+        return _dress(_RECORDS.read(DressFile, table))
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from error
 
 
-def _dress(table: Table) -> Dress | None:
-    package, ending, attribution = (table.text(key) for key in ("package", "urdf", "attribution"))
-    root, kept = table.text("root"), frozenset(table.texts("kept"))
-    garments = tuple(_garment(entry) for entry in table.tables("garment"))
-    table.done()
-    urdf = package_file(package, ending)
+def _dress(file: DressFile) -> Dress | None:
+    urdf = package_file(file.package, file.urdf)
     if urdf is None:
         return None
-    credit = attribution.replace("{version}", metadata.version(package))
-    return Dress(urdf=urdf, root=root, garments=garments, kept=kept, attribution=credit)
+    credit = file.attribution.replace("{version}", metadata.version(file.package))
+    garments = tuple(_garment(entry) for entry in file.garment)
+    return Dress(urdf=urdf, root=file.root, garments=garments, kept=frozenset(file.kept), attribution=credit)
 
 
-def _garment(entry: Table) -> Garment:
-    link = entry.text("link")
-    rgba = tuple(np.clip(entry.numbers("rgba", 4), 0.0, 1.0).tolist()) if "rgba" in entry else None
-    garment = Garment(link=link, source=entry.text("source", link), at=entry.text("at", link), rgba=rgba)
-    entry.done()
-    return garment
+def _garment(entry: GarmentTable) -> Garment:
+    rgba = None if entry.rgba is None else tuple(np.clip(entry.rgba, 0.0, 1.0).tolist())
+    return Garment(link=entry.link, source=entry.source or entry.link, at=entry.at or entry.link, rgba=rgba)

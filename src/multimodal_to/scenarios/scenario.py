@@ -44,28 +44,48 @@ class Weights:
     """Weight of each cost; a weight of zero adds nothing to the problem.
 
     Running costs are weight × squared 2-norm × Δt at the end of every interval; `initial_posture` and `final_*` are
-    weight × squared 2-norm at that knot, without Δt.
+    weight × squared 2-norm at that knot, without Δt. The objective has no unit; in the units of running weights the
+    1/s that Δt asks for is left out.
     """
 
-    com_velocity: float = 0.0  # ẋ [m/s]
-    com_acceleration: float = 0.0  # ẍ [m/s²]
-    angular_momentum: float = 0.0  # hω [kg m²/s]
-    angular_momentum_rate: float = 0.0  # ḣω [N m]
-    base_acceleration: float = 0.0  # v̇, of the base's twist [m/s², rad/s²]
-    joint_velocities: Mapping[str, float] = field(default_factory=dict)  # ṡ by joint group [rad/s]
-    posture: float = 0.0  # s − s̄ [rad]
-    base_orientation: float = 0.0  # base away from home, as a quaternion's vector part [1]
-    contact_forces: float = 0.0  # f [N]
-    contact_force_rates: float = 0.0  # ḟ [N/s]
-    thrust: float = 0.0  # T [N]
-    thrust_rate: float = 0.0  # Ṫ [N/s]
-    throttle: float = 0.0  # u [%]
-    initial_posture: float = 0.0  # s − s̄ at the first knot, where it is found
-    final_posture: float = 0.0  # s − the standing posture, at the last knot
+    com_velocity: float = 0.0
+    """Weight of ẋ, the velocity of the CoM [1/(m/s)²]."""
+    com_acceleration: float = 0.0
+    """Weight of ẍ, the acceleration of the CoM [1/(m/s²)²]."""
+    angular_momentum: float = 0.0
+    """Weight of hω, about the CoM [1/(kg m²/s)²]."""
+    angular_momentum_rate: float = 0.0
+    """Weight of ḣω [1/(N m)²]."""
+    base_acceleration: float = 0.0
+    """Weight of v̇, of the base's twist [1/(m/s²)², 1/(rad/s²)²]."""
+    joint_velocities: Mapping[str, float] = field(default_factory=dict)
+    """Weights of ṡ by joint group of the robot [1/(rad/s)²]."""
+    posture: float = 0.0
+    """Weight of s − s̄, away from the standing posture [1/rad²]."""
+    base_orientation: float = 0.0
+    """Weight of the base away from home, as a quaternion's vector part [1]."""
+    contact_forces: float = 0.0
+    """Weight of f [1/N²]."""
+    contact_force_rates: float = 0.0
+    """Weight of ḟ [1/(N/s)²]."""
+    thrust: float = 0.0
+    """Weight of T [1/N²]."""
+    thrust_rate: float = 0.0
+    """Weight of Ṫ [1/(N/s)²]."""
+    throttle: float = 0.0
+    """Weight of u [1/%²]."""
+    initial_posture: float = 0.0
+    """Weight of s − s̄ at the first knot, where it is found [1/rad²]."""
+    final_posture: float = 0.0
+    """Weight of s − the standing posture, at the last knot [1/rad²]."""
     final_com_velocity: float = 0.0
+    """Weight of ẋ at the last knot [1/(m/s)²]."""
     final_com_acceleration: float = 0.0
+    """Weight of ẍ at the last knot [1/(m/s²)²]."""
     final_angular_momentum: float = 0.0
+    """Weight of hω at the last knot [1/(kg m²/s)²]."""
     final_angular_momentum_rate: float = 0.0
+    """Weight of ḣω at the last knot [1/(N m)²]."""
 
     def __post_init__(self) -> None:
         for entry in fields(self):
@@ -85,27 +105,47 @@ class Scenario:
     """
 
     name: str
+    """What the scenario is called; results go to a folder of that name."""
     title: str
-    knots: int  # N, the number of intervals
-    initial_com: Vector3  # [m]
-    final_com: Vector3  # [m]
+    """What it is about, for a person."""
+    knots: int
+    """N, the number of intervals [1]."""
+    initial_com: Vector3
+    """Where the CoM starts, in the world [m]."""
+    final_com: Vector3
+    """Where the CoM ends, in the world [m]."""
     start: Start = Start.STANDING
+    """How the motion starts."""
     terminal: Terminal
-    mid_height_min: float | None = None  # least height of the CoM at mid-horizon [m]
-    jets: bool = True  # False: the robot leaves them off, and the problem has none
-    interval_min: float  # least Δt [s]
-    interval_max: float  # greatest Δt [s]
+    """How the motion ends."""
+    mid_height_min: float | None = None
+    """Least height of the CoM at mid-horizon, where one is asked for [m]."""
+    jets: bool = True
+    """Whether the robot uses its jets; without them the problem has none."""
+    interval_min: float
+    """Least Δt [s]."""
+    interval_max: float
+    """Greatest Δt [s]."""
     weights: Weights
+    """The weight of each cost."""
     surface: Surface = field(default_factory=FlatGround)
-    friction: float | None = None  # None: the robot's own
+    """The ground."""
+    friction: float | None = None
+    """Coefficient of friction [1]; where there is none, the robot's own holds."""
     friction_cone: FrictionCone = FrictionCone.PYRAMID
-    complementarity_max: float = 5e-3  # ε_n, greatest height × normal force of a contact point [N m]
-    sliding_max: float = 2e-3  # ε_t, greatest slip over an interval × normal force of a contact point [N m]
-    base_speed_max: float = 2.0  # of each component of the base's twist [m/s, rad/s]
-    com_range: Vector3 = (1.5, 1.5, 1.5)  # the CoM's greatest distance from the world's origin, by axis [m]
+    """Which forces a contact point can bear without slipping."""
+    complementarity_max: float = 5e-3
+    """ε_n, greatest height × normal force of a contact point [N m]."""
+    sliding_max: float = 2e-3
+    """ε_t, greatest slip over an interval × normal force of a contact point [N m]."""
+    base_speed_max: float = 2.0
+    """Greatest size of each component of the base's twist [m/s, rad/s]."""
+    com_range: Vector3 = (1.5, 1.5, 1.5)
+    """The CoM's greatest distance from the world's origin, by axis [m]."""
     allowances: Mapping[str, float] = field(default_factory=dict)
-    """Limits of the audit's properties by name, each in its unit, where they are wider than the audit's own."""
-    guess_steps: int = 0  # how many steps the feet take in the start guess, in turns; 0: they glide along with the CoM
+    """Limits of the audit's properties by name, where they are wider than the audit's own [the property's own]."""
+    guess_steps: int = 0
+    """How many steps the feet take in the start guess, in turns [1]; with 0 they glide along with the CoM."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "allowances", MappingProxyType(dict(self.allowances)))

@@ -82,6 +82,11 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
 def refuse_missing(stored: Mapping[str, np.ndarray], wanted: Iterable[str], source: Path) -> None:
     """Name what an archive lacks.
 
+    Args:
+        stored: the arrays of the archive by name.
+        wanted: the names that it has to have.
+        source: the file, for the error.
+
     Raises:
         TrajectoryError: it lacks something.
     """
@@ -91,6 +96,11 @@ def refuse_missing(stored: Mapping[str, np.ndarray], wanted: Iterable[str], sour
 
 def numbers(stored: Mapping[str, np.ndarray], name: str, source: Path) -> Array:
     """Return an array of an archive as floats.
+
+    Args:
+        stored: the arrays of the archive by name.
+        name: of the array.
+        source: the file, for errors.
 
     Raises:
         TrajectoryError: the array is not numeric, or a number is larger than `LARGEST_VALUE`.
@@ -108,6 +118,11 @@ def numbers(stored: Mapping[str, np.ndarray], name: str, source: Path) -> Array:
 def texts(stored: Mapping[str, np.ndarray], name: str, source: Path) -> tuple[str, ...]:
     """Return an array of an archive as texts.
 
+    Args:
+        stored: the arrays of the archive by name.
+        name: of the array.
+        source: the file, for errors.
+
     Raises:
         TrajectoryError: the array holds no texts.
     """
@@ -124,6 +139,11 @@ def texts(stored: Mapping[str, np.ndarray], name: str, source: Path) -> tuple[st
 
 def text(stored: Mapping[str, np.ndarray], name: str, source: Path) -> str:
     """Return an array of an archive as one text.
+
+    Args:
+        stored: the arrays of the archive by name.
+        name: of the array.
+        source: the file, for errors.
 
     Raises:
         TrajectoryError: the array does not hold one text.

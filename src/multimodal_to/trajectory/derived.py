@@ -45,7 +45,13 @@ def base_poses(trajectory: Trajectory) -> Array:
 
 
 def frame_poses(robot: Robot, trajectory: Trajectory, frame: str) -> Array:
-    """Return w_H_frame, the world pose of a link or frame at every knot, (knots + 1, 4, 4)."""
+    """Return w_H_frame, the world pose of a link or frame at every knot, (knots + 1, 4, 4).
+
+    Args:
+        robot: the robot of the trajectory.
+        trajectory: its base and joints are used.
+        frame: the name of a link or frame of the URDF.
+    """
     function = robot.kindyn.forward_kinematics_fun(frame).map(trajectory.time.size)
     side_by_side = np.hstack(list(base_poses(trajectory)))
     return _stacked(function(side_by_side, trajectory.joint_positions))
@@ -72,6 +78,11 @@ def contact_products(robot: Robot, trajectory: Trajectory, surface: Surface) -> 
     """Return what complementarity bounds [N m], (contacts, knots + 1) each: height and slip, times the normal force.
 
     The slip is that over the interval that ends at the knot, ‖tᵀ Δp‖.
+
+    Args:
+        robot: the robot of the trajectory; its contact points come from forward kinematics.
+        trajectory: the motion.
+        surface: the ground.
     """
     points = contact_points(robot, trajectory)
     heights, normals, tangents = surface_frames(surface, points)
@@ -103,6 +114,11 @@ def footsteps(robot: Robot, trajectory: Trajectory, surface: Surface) -> list[Fo
 
     A foot stands while one of its contact points carries more than `LOADED`. What is in between is a step if the foot's
     lowest point was at least `STEP_LIFT` high and its middle came down at least `STEP_LENGTH` away.
+
+    Args:
+        robot: says which contact points make a foot.
+        trajectory: the motion.
+        surface: the ground, from which lifts are measured.
     """
     points = contact_points(robot, trajectory)
     heights, normals, _ = surface_frames(surface, points)

@@ -37,7 +37,13 @@ def resample(trajectory: Trajectory, times: Array) -> Trajectory:
 
 
 def _slerp(start: Array, end: Array, share: Array) -> Array:
-    """Return unit quaternions (4, n) a share of the shorter way from start to end."""
+    """Return unit quaternions (4, n) a share of the shorter way from start to end.
+
+    Args:
+        start: quaternions x y z w of any length, (4, n).
+        end: the same.
+        share: from 0, the start, to 1, the end, (n,).
+    """
     start, end = start / np.linalg.norm(start, axis=0), end / np.linalg.norm(end, axis=0)
     end = end * np.where((start * end).sum(axis=0) < 0.0, -1.0, 1.0)
     angle = np.arctan2(np.linalg.norm(end - start, axis=0), np.linalg.norm(end + start, axis=0)) * 2.0

@@ -1,0 +1,165 @@
+"""Tables of a file as frozen dataclasses, and back: the fields are the only list of keys there is.
+
+Keys are the names of the fields, dotted where they are nested (`weights.thrust`); enumerations are their values; what
+is one of several classes is a table with its `kind`. What has no value is left out.
+
+This is written by hand although libraries do the like. With cattrs the numbers, lists, tables, enumerations, kinds,
+partial tables and the sentences of errors would each still be a hook of ours, of about the same length together.
+msgspec takes unknown keys of a dataclass for good, and its errors keep back the value and the key of a mapping.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from enum import Enum
+from types import UnionType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+
+from multimodal_to.errors import InputError, MultimodalError, shown, unknown
+from multimodal_to.files.reading import is_number
+
+Record = TypeVar("Record")
+Unions = Mapping[Any, Mapping[str, type]]
+"""The classes that may stand for a type, by their `kind`; none of them is the type of a field on its own."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Records:
+    """Reads records of one sort of file; every error is one sentence that names the key and what was expected."""
+
+    what: str  # what lacks a key in an error, such as "the scenario"
+    error: type[MultimodalError]
+    unions: Unions = field(default_factory=dict)
+
+    def read(self, record: type[Record], table: Any, base: Record | None = None, *, also: Iterable[str] = ()) -> Record:
+        """Return a record made of a table; what the table lacks is the base's, or the field's default.
+
+        Args:
+            record: a frozen dataclass.
+            table: as `files.reading.read_toml` returns it.
+            base: what the table changes.
+            also: further keys that the file may have, which the caller has taken out; an unknown one may mean them.
+
+        Raises:
+            MultimodalError: a key is unknown or missing, or a value is not what its key takes; of the class `error`.
+        """
+        if not isinstance(table, Mapping):
+            raise self._wrong(self.what, table, "a table")
+        made: Record = self._record(record, table, "", base, also)
+        return made
+
+    def plain(self, value: Any) -> Any:
+        """Return a record as dictionaries, lists, numbers and texts, as TOML and JSON hold them."""
+        if isinstance(value, Enum):
+            return value.value
+        if is_dataclass(value):
+            kinds = {kind: name for union in self.unions.values() for name, kind in union.items()}
+            entries = {"kind": kinds.get(type(value))} | {
+                item.name: getattr(value, item.name) for item in fields(value)
+            }
+            return {name: self.plain(entry) for name, entry in entries.items() if entry is not None}
+        if isinstance(value, Mapping):
+            return {key: self.plain(entry) for key, entry in value.items()}
+        if isinstance(value, tuple):
+            return [self.plain(entry) for entry in value]
+        return value
+
+    def _record(self, kind: Any, table: Any, where: str, base: Any, also: Iterable[str] = ()) -> Any:
+        if not isinstance(table, Mapping):
+            raise self._wrong(where, table, "a table")
+        prefix, hints = f"{where}." if where else "", get_type_hints(kind)
+        for key in table:
+            if key not in hints:
+                raise self.error(unknown("key", prefix + key, [prefix + name for name in (*hints, *also)]))
+        values: dict[str, Any] = {entry.name: getattr(base, entry.name) for entry in fields(kind)} if base else {}
+        for key, value in table.items():
+            values[key] = self.value(hints[key], value, prefix + key, values.get(key))
+        needed = [entry.name for entry in fields(kind) if entry.default is MISSING and entry.default_factory is MISSING]
+        if missing := [f"'{prefix}{name}'" for name in needed if name not in values]:
+            raise self.error(f"{self.what} lacks {', '.join(missing)}")
+        try:
+            return kind(**values)
+        except InputError as error:
+            raise self.error(f"'{where}': {error}" if where else str(error)) from error
+
+    def _one_of(self, kinds: Mapping[str, type], table: Any, where: str, base: Any) -> Any:
+        """Return the record of a table with its kind; of the base's kind, it keeps what the table lacks.
+
+        Args:
+            kinds: the classes by their kind.
+            table: as the file has it; a text is a kind alone.
+            where: what errors call it.
+            base: the record that the table changes, if any.
+        """
+        table = {"kind": table} if isinstance(table, str) else table
+        if not isinstance(table, Mapping):
+            raise self._wrong(where, table, "a table with a kind")
+        own = next((name for name, kind in kinds.items() if kind is type(base)), None)
+        name = table.get("kind", own)
+        if not isinstance(name, str) or name not in kinds:
+            raise self._wrong(f"{where}.kind", name, f"one of {', '.join(kinds)}")
+        rest = {key: value for key, value in table.items() if key != "kind"}
+        return self._record(kinds[name], rest, where, base if name == own else None)
+
+    def value(self, kind: Any, value: Any, key: str, base: Any = None) -> Any:
+        """Return a value as a field's type has it.
+
+        Args:
+            kind: the type: a number, text, enumeration, tuple, mapping, dataclass, or one of the unions.
+            value: as the file has it.
+            key: what errors call it.
+            base: the value that a table changes, if any.
+        """
+        kind = without_none(kind)
+        if kind in self.unions:
+            return self._one_of(self.unions[kind], value, key, base)
+        if is_dataclass(kind):
+            return self._record(kind, value, key, base)
+        if get_origin(kind) is tuple:
+            return self._tuple(get_args(kind), value, key)
+        if get_origin(kind) is Mapping:
+            if not isinstance(value, Mapping):
+                raise self._wrong(key, value, "a table")
+            inner = get_args(kind)[1]
+            return {
+                **(base or {}),
+                **{name: self.value(inner, entry, f"{key}.{name}", None) for name, entry in value.items()},
+            }
+        if issubclass(kind, Enum):
+            members = {member.value: member for member in kind}
+            if not isinstance(value, str) or value not in members:
+                raise self._wrong(key, value, f"one of {', '.join(members)}")
+            return members[value]
+        return self._scalar(kind, value, key)
+
+    def _tuple(self, members: tuple[Any, ...], value: Any, key: str) -> tuple[Any, ...]:
+        if not isinstance(value, list | tuple):
+            raise self._wrong(key, value, "a list")
+        kinds = [members[0]] * len(value) if members[-1] is Ellipsis else list(members)
+        if len(value) != len(kinds):
+            raise self._wrong(key, value, f"a list of {len(kinds)}")
+        return tuple(
+            self.value(kind, entry, f"{key}[{index}]", None)
+            for index, (kind, entry) in enumerate(zip(kinds, value, strict=True))
+        )
+
+    def _scalar(self, kind: Any, value: Any, key: str) -> Any:
+        if kind is float:
+            if not is_number(value):
+                raise self._wrong(key, value, "a finite number")
+            return float(value)
+        expected = {int: "a whole number", bool: "true or false", str: "a text"}[kind]
+        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+            raise self._wrong(key, value, expected)
+        return value
+
+    def _wrong(self, key: str, value: Any, expected: str) -> MultimodalError:
+        return self.error(f"'{key}' is {shown(value)}; expected {expected}")
+
+
+def without_none(kind: Any) -> Any:
+    """Return the type of a field whose value may also be None."""
+    if isinstance(kind, UnionType):
+        return next(member for member in get_args(kind) if member is not type(None))
+    return kind

@@ -1,0 +1,153 @@
+"""What a `robot.toml` holds, table by table: the only list of its keys, with what each number has to be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from multimodal_to.errors import InputError, shown
+from multimodal_to.files.keys import Key, keys_of
+from multimodal_to.models.jet import JetModel
+from multimodal_to.models.proportions import SWING
+
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointTable:
+    """A joint of `[joints]`."""
+
+    lower: float
+    """Least position to plan with, within the URDF's own range [rad or m]."""
+    upper: float
+    """Greatest position to plan with, within the URDF's own range [rad or m]."""
+    speed: float
+    """Greatest speed to plan with, either way [rad/s or m/s]."""
+    home: float
+    """Position in the home posture [rad or m]."""
+
+    def __post_init__(self) -> None:
+        if not self.lower <= self.home <= self.upper:
+            raise InputError(f"home {self.home} is not within its range {self.lower} to {self.upper}")
+        _positive("speed", self.speed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HomeTable:
+    """The table `[home]`."""
+
+    base_position: Vector3
+    """Origin of the base in the world at home [m]."""
+    base_quaternion_xyzw: tuple[float, float, float, float]
+    """World-from-base rotation at home as a unit quaternion, x y z w [1]."""
+
+    def __post_init__(self) -> None:
+        norm = float(np.linalg.norm(self.base_quaternion_xyzw))
+        if abs(norm - 1) > 1e-3:
+            raise InputError(f"base_quaternion_xyzw has the norm {norm:.4f}; expected 1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactTable:
+    """The table `[contact]`."""
+
+    friction: float
+    """Coefficient of friction between contact points and ground; a scenario may state another [1]."""
+    feet: Mapping[str, tuple[str, ...]]
+    """The frames that may touch the ground, by foot; their order is that of the contact points."""
+
+    def __post_init__(self) -> None:
+        _positive("friction", self.friction)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachTable:
+    """The table `[reach]`."""
+
+    contacts: Vector3 | None = None
+    """Greatest distance of a contact point from the CoM in a plan, by world axis [m]. Where there is none, it is the
+    distance at home and a quarter of L more, and x and y are alike; L is the CoM's height above the contact points at
+    home."""
+    jets: Vector3 | None = None
+    """Greatest distance of a jet's frame from the CoM in a plan, by world axis [m]. Where there is none, it is the
+    distance at home and a quarter of L more along every axis."""
+
+    def __post_init__(self) -> None:
+        for name, axes in (("contacts", self.contacts), ("jets", self.jets)):
+            if axes is not None and min(axes) <= 0:
+                raise InputError(f"{name} is {shown(list(axes))}; expected three positive numbers [m]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class GaitTable:
+    """The table `[gait]`."""
+
+    lift: float | None = None
+    """Height of a swing in a start guess with steps [m]. Where there is none, it is 7 % of L."""
+    swing: float = SWING
+    """Share of a step's time in which its foot is in the air [1]."""
+
+    def __post_init__(self) -> None:
+        if self.lift is not None:
+            _positive("lift", self.lift)
+        if not 0 < self.swing <= 1:
+            raise InputError(f"swing is {self.swing}; expected a number above 0 and at most 1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class JetTable:
+    """One of the tables `[[jet]]`."""
+
+    name: str
+    """What the jet is called."""
+    frame: str
+    """The frame that it sits in; its thrust acts along −z of this frame."""
+    model: str
+    """Which of `jet_models` it is."""
+    thrust_max: float
+    """Greatest thrust [N]."""
+    throttle: tuple[float, float]
+    """Least and greatest throttle [%]."""
+
+    def __post_init__(self) -> None:
+        _positive("thrust_max", self.thrust_max)
+        if not self.throttle[0] < self.throttle[1]:
+            raise InputError(f"throttle is {shown(list(self.throttle))}; expected two numbers that rise")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotFile:
+    """The whole file."""
+
+    name: str
+    """What the robot is called."""
+    urdf: str
+    """Path of the URDF, from the robot's folder and inside it."""
+    joints: Mapping[str, JointTable]
+    """The joints that move, by their names in the URDF, in the order of s; all others stay at zero."""
+    joint_groups: Mapping[str, tuple[str, ...]]
+    """Names for sets of joints, which weights of a scenario refer to."""
+    home: HomeTable
+    """The home posture, together with the joints' own; postures are searched near it."""
+    contact: ContactTable
+    """What touches the ground."""
+    reach: ReachTable = field(default_factory=ReachTable)
+    """How far from the CoM contact points and jets may be in a plan."""
+    gait: GaitTable = field(default_factory=GaitTable)
+    """How feet go in a start guess with steps."""
+    jet: tuple[JetTable, ...] = ()
+    """The jets, in their order."""
+    jet_models: Mapping[str, JetModel] = field(default_factory=dict)
+    """Thrust dynamics of sorts of jets, by name."""
+
+
+def robot_keys() -> tuple[Key, ...]:
+    """Return every key that a `robot.toml` may have."""
+    return keys_of(RobotFile, {})
+
+
+def _positive(name: str, number: float) -> None:
+    if number <= 0:
+        raise InputError(f"{name} is {number}; expected a positive number")
