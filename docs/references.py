@@ -16,12 +16,15 @@ from types import MappingProxyType
 
 from multimodal_to.adam import urdf
 from multimodal_to.auditing import PROPERTIES, Judged, Property
+from multimodal_to.files.keys import Key
 from multimodal_to.files.reading import LARGEST_TOML
 from multimodal_to.models.robot import load_robot
+from multimodal_to.models.robot_keys import robot_keys
 from multimodal_to.models.terrain import MOST_NODES
 from multimodal_to.ocp import Constraint, Cost, Formulation, Parameters
 from multimodal_to.replay.meshes import LARGEST_MESH
 from multimodal_to.scenarios import SCENARIOS
+from multimodal_to.scenarios.keys import scenario_keys
 from multimodal_to.scenarios.scenario import MOST_KNOTS
 from multimodal_to.trajectory import ENTRIES, FORMATS, QUANTITIES, archive
 
@@ -152,6 +155,26 @@ def _limit(entry: Property) -> str:
     return text
 
 
+# ---------------------------------------------------------------- files of TOML
+
+
+def keys(every: Iterable[Key]) -> str:
+    """Return the keys of a file with what each takes, its unit, what holds without it, and its meaning."""
+    return table(
+        ("key", "type", "unit", "default", "meaning"),
+        [
+            (
+                f"`{key.name}`",
+                key.kind,
+                key.unit or "–",
+                key.default,
+                f"{key.meaning}. Only with `{key.where}`" if key.where else key.meaning,
+            )
+            for key in every
+        ],
+    )
+
+
 # ---------------------------------------------------------------- the formulation
 
 
@@ -280,6 +303,8 @@ TABLES: Mapping[str, Callable[[], str]] = MappingProxyType(
         "formats": formats,
         "limits": limits,
         "properties": properties,
+        "scenario keys": lambda: keys(scenario_keys()),
+        "robot keys": lambda: keys(robot_keys()),
         "terms": terms,
         "rooms": rooms,
         "rooms picture": rooms_picture,

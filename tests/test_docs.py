@@ -7,6 +7,8 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,7 @@ import multimodal_to as mt
 from multimodal_to.adam.urdf import LARGEST_URDF
 from multimodal_to.auditing import PROPERTIES
 from multimodal_to.files.reading import LARGEST_TOML
+from multimodal_to.models.terrain import SURFACES
 from multimodal_to.replay.meshes import LARGEST_MESH
 from multimodal_to.trajectory import ENTRIES, FORMATS, QUANTITIES, archive
 from test_layering import FLOORS
@@ -153,3 +156,28 @@ def test_every_term_of_the_paper_is_on_its_page_with_its_formula():
         row = next(line for line in text.splitlines() if line.startswith(f"| `{term.name}` |"))
         assert term.formula.split("\n")[0].removesuffix(".").replace("|", r"\|") in row
         assert all(place.value in row for place in term.places)
+
+
+def test_every_field_of_a_scenario_is_on_its_page():
+    text = filled("reference/scenario.md")
+    prefixes = {"": mt.Scenario, "weights.": mt.Weights}
+    names = [prefix + entry.name for prefix, kind in prefixes.items() for entry in fields(kind)]
+    assert [name for name in names if f"| `{name}` | " not in text] == []
+    assert f"one of {', '.join(SURFACES)}" in text
+
+
+def test_every_key_of_the_bundled_robots_file_is_on_its_page():
+    text = filled("reference/robot.md")
+
+    with (ROOT / "robots/ironcub/robot.toml").open("rb") as stream:
+        written = tomllib.load(stream)
+    tables = {
+        "": written,
+        "home.": written["home"],
+        "contact.": written["contact"],
+        "joints.<name>.": next(iter(written["joints"].values())),
+        "jet[].": written["jet"][0],
+        "jet_models.<name>.": next(iter(written["jet_models"].values())),
+    }
+    names = [prefix + key for prefix, some in tables.items() for key in some]
+    assert [name for name in names if f"| `{name}` | " not in text] == []
