@@ -2,13 +2,15 @@ from __future__ import annotations
 
 import contextlib
 import io
+import pickle
 import runpy
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
+from filelock import FileLock
 
 import multimodal_to as mt
 
@@ -18,9 +20,9 @@ SHORT = {
     "landing": (35, 0.2, 0.2),
     "take_off_and_landing": (100, 0.1, 0.2),
     "walk_to_fly": (50, 0.2, 0.2),
-    "step_up": (35, 0.2, 0.2),
+    "step_up": (28, 0.25, 0.25),
 }
-"""Knots and range of the time step [s] of the scenarios in the examples' tests: half as many as in earnest."""
+"""Knots and range of the time step [s] of the scenarios in the examples' tests: half as many as in earnest, or less."""
 
 
 @pytest.fixture(scope="session")
@@ -29,16 +31,33 @@ def ironcub() -> mt.Robot:
 
 
 @pytest.fixture(scope="session")
-def take_off(ironcub: mt.Robot) -> mt.Solution:
-    """The take-off with all its knots, from the plain start guess with default options."""
-    return mt.solve(mt.build(ironcub, mt.scenarios.take_off()))
+def once(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Callable[..., Any]:
+    """Make a thing once a session, whichever of the processes that run the tests needs it first; others wait for it."""
+    base = tmp_path_factory.getbasetemp()
+    folder = base.parent if hasattr(request.config, "workerinput") else base
+
+    def made(name: str, make: Callable[[], Any]) -> Any:
+        file = folder / f"{name}.pickle"
+        with FileLock(f"{file}.lock"):
+            if not file.exists():
+                file.write_bytes(pickle.dumps(make()))
+        return pickle.loads(file.read_bytes())
+
+    return made
 
 
 @pytest.fixture(scope="session")
-def run_example(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[str, mt.Trajectory]]:
+def take_off(ironcub: mt.Robot, once: Callable[..., Any]) -> mt.Solution:
+    """The take-off with all its knots, from the plain start guess with default options."""
+    return once("take-off", lambda: mt.solve(mt.build(ironcub, mt.scenarios.take_off())))
+
+
+@pytest.fixture(scope="session")
+def run_example(
+    tmp_path_factory: pytest.TempPathFactory, once: Callable[..., Any]
+) -> Callable[[str], tuple[str, mt.Trajectory]]:
     """Run an example by its name, once a session, with short scenarios; what it prints, and the trajectory it saves."""
 
-    @cache
     def run(name: str) -> tuple[str, mt.Trajectory]:
         printed, folder = io.StringIO(), tmp_path_factory.mktemp(name)
         with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
@@ -52,4 +71,4 @@ def run_example(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tup
         (file,) = folder.rglob("trajectory.npz")
         return printed.getvalue(), mt.Trajectory.load(file)
 
-    return run
+    return lambda name: once(name, lambda: run(name))

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 
 from multimodal_to import scenario_files, scenarios
+from multimodal_to.cli import main
 from multimodal_to.cli.expectation import TYPICAL_ITERATIONS
 from multimodal_to.cli.showing import _labels
 from multimodal_to.models.terrain import Plane
@@ -327,11 +329,16 @@ def test_bare_arrays_are_audited_once_their_robot_is_named(file, tmp_path):
         (("robot", "info", __file__), "is not valid XML"),
     ],
 )
-def test_bad_input_ends_in_one_sentence_and_two(tmp_path, arguments, sentence):
-    result = run(*arguments, cwd=tmp_path)
-    assert result.returncode == 2
-    assert result.stderr.count("\n") == 1
-    assert sentence in result.stderr
+def test_bad_input_ends_in_one_sentence_and_two(tmp_path, monkeypatch, capsys, arguments, sentence):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["multimodal-to", *arguments])
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # which `main` replaces
+    with pytest.raises(SystemExit) as ended:
+        main()
+    said = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert said.count("\n") == 1
+    assert sentence in said
     assert list(tmp_path.rglob("*.npz")) == []
 
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -32,6 +33,22 @@ def trajectory(robot):
 @pytest.fixture
 def figure(robot, trajectory):
     return plotting.plot_forces(robot, trajectory)
+
+
+@pytest.fixture(scope="module")
+def drawn(robot, trajectory):
+    """A figure by its name with one or several runs, drawn once for all tests that look at it; and its renderer."""
+
+    @cache
+    def draw(name, count):
+        runs = [replace(trajectory, scenario=f"scenario-{number}") for number in range(count)]
+        labels = [f"results/of-today/{run.scenario}/trajectory.npz" for run in runs]
+        figure = plotting.plot(name, robot, *runs, labels=labels if count > 1 else None)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        return figure, canvas.get_renderer()
+
+    return draw
 
 
 def lines(axes) -> dict[str, np.ndarray]:
@@ -145,11 +162,8 @@ def test_the_figure_belongs_to_no_window_and_is_saved_by_its_caller(figure):
 
 
 @pytest.mark.parametrize("name", sorted(plotting.FIGURES))
-def test_every_figure_has_units_and_no_legend_over_its_data(name, robot, trajectory):
-    figure = plotting.plot(name, robot, trajectory)
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    renderer = canvas.get_renderer()
+def test_every_figure_has_units_and_no_legend_over_its_data(name, drawn):
+    figure, renderer = drawn(name, 1)
     titles = [axes.get_ylabel() for axes in figure.axes] + [text.get_text() for text in all_texts(figure)]
     assert any("[" in title for title in titles)
     for axes in figure.axes:
@@ -160,13 +174,8 @@ def test_every_figure_has_units_and_no_legend_over_its_data(name, robot, traject
 
 @pytest.mark.parametrize("count", [1, 4])
 @pytest.mark.parametrize("name", sorted(plotting.FIGURES))
-def test_no_text_of_a_figure_lies_over_another_or_beyond_its_edge(name, count, robot, trajectory):
-    runs = [replace(trajectory, scenario=f"scenario-{number}") for number in range(count)]
-    labels = [f"results/of-today/{run.scenario}/trajectory.npz" for run in runs]
-    figure = plotting.plot(name, robot, *runs, labels=labels if count > 1 else None)
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    renderer = canvas.get_renderer()
+def test_no_text_of_a_figure_lies_over_another_or_beyond_its_edge(name, count, drawn):
+    figure, renderer = drawn(name, count)
     boxes = [(text.get_text(), text.get_window_extent(renderer)) for text in drawn_texts(figure)]
     assert len(boxes) > 20
     for index, (text, box) in enumerate(boxes):

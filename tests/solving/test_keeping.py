@@ -7,11 +7,11 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+import kill
 import multimodal_to as mt
 from multimodal_to.errors import SolverError
 from multimodal_to.scenarios import files as scenario_files
@@ -20,9 +20,6 @@ from multimodal_to.solving.best import FEASIBLE, Best, Checkpoint
 from multimodal_to.solving.ipopt import Pass
 from multimodal_to.solving.solver import StartPoint
 from multimodal_to.trajectory import QUANTITIES
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-import kill
 
 SCENARIO = replace(
     mt.scenarios.jump(),

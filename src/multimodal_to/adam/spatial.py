@@ -24,7 +24,13 @@ def rotation_about_z(cosine: SX, sine: SX) -> SX:
 
 
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Return R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3), angles in rad: URDF's convention."""
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3), angles in rad: URDF's convention.
+
+    Args:
+        roll: about x [rad].
+        pitch: about y [rad].
+        yaw: about z [rad].
+    """
     (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
     return np.array(
         [

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yourdfpy
 from lxml import etree
 
 from multimodal_to.adam.lean_tree import build_tree
@@ -76,6 +75,8 @@ def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
         ModelError: the file is missing, larger than `LARGEST_URDF` or no URDF, or it has no links, or more than
             `MOST_LINKS` or `MOST_ELEMENTS`.
     """
+    import yourdfpy  # takes longer to import than all the rest, and what reads no URDF does without
+
     text, source = _read(urdf)
     try:
         # Entities are not expanded and nothing is fetched: a URDF from elsewhere is only text.

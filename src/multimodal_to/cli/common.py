@@ -127,5 +127,11 @@ def described(report: Audit) -> str:
 
 
 def say(what: str, style: str, sentence: str) -> None:
-    """Print to the standard error, with colour where it is a terminal."""
+    """Print to the standard error, with colour where it is a terminal.
+
+    Args:
+        what: the first word, such as `error`.
+        style: of that word, as `rich` names it.
+        sentence: the message.
+    """
     Console(stderr=True, highlight=False).print(Text.assemble((f"{what}: ", style), sentence), soft_wrap=True)

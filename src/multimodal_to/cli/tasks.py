@@ -29,6 +29,13 @@ def given(
 ) -> Task:
     """Return the task that the options of `solve` ask for.
 
+    Args:
+        name: of a bundled scenario, or its TOML file.
+        settings: changes as `KEY=VALUE`.
+        robot: name or folder; empty for the file's own, or the iRonCub.
+        warm_start: trajectory file of a similar task.
+        resume: checkpoint or trajectory file of an unfinished solve.
+
     Raises:
         InputError: they contradict each other, or none of them is a task.
         ScenarioError: the file to go on from keeps no scenario.
@@ -59,7 +66,13 @@ def given(
 
 
 def free_checkpoint(folder: Path, resume: Path | None, console: Console) -> Path:
-    """Return where the checkpoint goes; one that an earlier solve left is moved aside, unless it is gone on from."""
+    """Return where the checkpoint goes; one that an earlier solve left is moved aside, unless it is gone on from.
+
+    Args:
+        folder: that the checkpoint goes to.
+        resume: the file that is gone on from.
+        console: that says what was moved.
+    """
     path = folder / "checkpoint.npz"
     if path.exists() and not (resume is not None and path.samefile(resume)):
         aside = path.replace(folder / "checkpoint-before.npz")

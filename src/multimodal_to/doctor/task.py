@@ -29,7 +29,13 @@ class Task:
 
     @classmethod
     def of(cls, robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> Task:
-        """Return a scenario for a robot, whose jets are left out if the scenario leaves them off."""
+        """Return a scenario for a robot, whose jets are left out if the scenario leaves them off.
+
+        Args:
+            robot: whose motion it is.
+            scenario: the task.
+            formulation: what the problem is made of; by default `Formulation.paper()`.
+        """
         robot = robot if scenario.jets else robot.with_jets(())
         return cls(robot=robot, scenario=scenario, formulation=formulation or Formulation.paper())
 

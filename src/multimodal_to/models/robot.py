@@ -173,9 +173,7 @@ def _robot(file: RobotFile, folder: Path) -> Robot:
     for frame in (*(point.frame for point in contacts), *(jet.frame for jet in jets)):
         kindyn.tree.frame(frame)
     home = _home(file)
-    contact_reach, jet_reach, gait = _proportions(
-        file, *(_offsets(kindyn, home, [body.frame for body in bodies]) for bodies in (contacts, jets))
-    )
+    contact_reach, jet_reach, gait = _proportions(file, kindyn, home)
     return Robot(
         name=file.name,
         urdf=urdf,
@@ -242,20 +240,24 @@ def _jets(file: RobotFile) -> tuple[Jet, ...]:
     return tuple(jets)
 
 
-def _proportions(file: RobotFile, contacts: Array, jets: Array) -> tuple[Array, Array, Gait]:
+def _proportions(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> tuple[Array, Array, Gait]:
     """Return the reach of contact points and of jets [m], (3,) each, and the gait: as stated, else in units of L.
 
     Args:
         file: what may state them.
-        contacts: offsets of the contact points from the CoM at home [m], (contacts, 3).
-        jets: offsets of the frames of the jets [m], (jets, 3).
+        kindyn: kinematics of the robot, which are asked only for what is not stated.
+        home: the home posture.
     """
-    stated, height = file.reach, proportions.standing_height(contacts, jets)
-    lift = proportions.LIFT * height if file.gait.lift is None else file.gait.lift
+    reach, gait = file.reach, file.gait
+    if reach.contacts is not None and reach.jets is not None and gait.lift is not None:
+        return np.array(reach.contacts), np.array(reach.jets), Gait(lift=gait.lift, swing=gait.swing)
+    contacts = _offsets(kindyn, home, [frame for frames in file.contact.feet.values() for frame in frames])
+    jets = _offsets(kindyn, home, [jet.frame for jet in file.jet])
+    height = proportions.standing_height(contacts, jets)
     return (
-        proportions.contact_reach(contacts, height) if stated.contacts is None else np.array(stated.contacts),
-        proportions.jet_reach(jets, height) if stated.jets is None else np.array(stated.jets),
-        Gait(lift=lift, swing=file.gait.swing),
+        proportions.contact_reach(contacts, height) if reach.contacts is None else np.array(reach.contacts),
+        proportions.jet_reach(jets, height) if reach.jets is None else np.array(reach.jets),
+        Gait(lift=proportions.LIFT * height if gait.lift is None else gait.lift, swing=gait.swing),
     )
 
 

@@ -18,7 +18,14 @@ _ORIENTATION = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def set_boundary(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture) -> None:
-    """Hold the first and last knots as the scenario says."""
+    """Hold the first and last knots as the scenario says.
+
+    Args:
+        bounds: of every variable at every knot; they are changed.
+        robot: with the jets that the scenario uses.
+        scenario: the task.
+        standing: the posture that a motion that starts on its feet starts in.
+    """
     _set_start(bounds, robot, scenario, standing)
     _set_end(bounds, scenario)
     if scenario.mid_height_min is not None:

@@ -40,7 +40,7 @@ def folder() -> Path:
     return (Path(named) if named else platformdirs.user_cache_path("multimodal-to", appauthor=False)) / "compiled"
 
 
-def kept(function: cs.Function) -> cs.Function:
+def machine_code(function: cs.Function) -> cs.Function:
     """Return a function's machine code where there is some, otherwise the function itself."""
     if not _worthwhile(function) or not folder().is_dir() or _compiler() is None:
         return function
@@ -52,7 +52,9 @@ def kept(function: cs.Function) -> cs.Function:
 
 
 def is_compiled(function: cs.Function) -> bool:
-    """Return whether a function is machine code."""
+    """Return whether a function is machine code, or a map of what is."""
+    while function.class_name() in ("Map", "ThreadMap"):
+        function = function.info()["f"]  # CasADi 3.7 finds no functions inside a map
     return bool(function.class_name() == "External")
 
 

@@ -29,6 +29,11 @@ def standing_posture(robot: Robot, surface: Surface, com: Vector3) -> Posture:
     The base keeps its home orientation; only where no posture stands so, on a slope that the ankles cannot follow, does
     it tilt, as little as the joints' way from home makes worth it. Least squares, solved by IPOPT.
 
+    Args:
+        robot: that stands.
+        surface: the ground.
+        com: where the CoM has to be, in the world [m].
+
     Raises:
         ScenarioError: no posture within the joint limits does that.
     """
@@ -102,6 +107,12 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     The standing posture moves with the CoM on the straight line from start to end. The contact points go along in x and
     y, or step `guess_steps` times. Contact forces carry the weight; a motion that starts in the air hands it over to
     them linearly from the thrusts, one that walks into the air the other way round. Everything else is zero.
+
+    Args:
+        robot: with the jets that the scenario uses.
+        scenario: the task.
+        standing: the posture that moves along.
+        layout: of the variables of a knot.
     """
     knots = scenario.knots + 1
     start, end = np.array(scenario.initial_com), np.array(scenario.final_com)

@@ -38,7 +38,13 @@ class BackwardEuler:
     name: str = PAPER_RULE
 
     def over(self, quantity: Callable[[Knot], SX], start: Knot, end: Knot) -> SX:
-        """Return the quantity at the interval's end."""
+        """Return the quantity at the interval's end.
+
+        Args:
+            quantity: a function of a knot.
+            start: the interval's first knot.
+            end: the interval's second knot.
+        """
         return quantity(end)
 
 

@@ -21,7 +21,13 @@ class Parameters:
 
     @classmethod
     def of(cls, robot: Robot, scenario: Scenario, standing: Posture) -> Parameters:
-        """Return the parameters of a scenario; a friction that it leaves open is the robot's."""
+        """Return the parameters of a scenario; a friction that it leaves open is the robot's.
+
+        Args:
+            robot: with the jets that the scenario uses.
+            scenario: the task.
+            standing: posture near home, with the CoM where the motion starts.
+        """
         return cls(
             robot=robot,
             scenario=scenario,

@@ -222,7 +222,13 @@ class Outline:
     held: list[Held]  # the rows that are bounds
 
     def terms_that_hold(self, variable: str, row: int, knot: int) -> tuple[str, ...]:
-        """Return the names of the terms that are bounds of one row of a variable at a knot."""
+        """Return the names of the terms that are bounds of one row of a variable at a knot.
+
+        Args:
+            variable: name of the variable.
+            row: which of its rows.
+            knot: which knot.
+        """
         return tuple(
             some.term for some in self.held if (some.variable, some.row) == (variable, row) and knot in some.knots
         )
@@ -255,7 +261,13 @@ def formulate(robot: Robot, scenario: Scenario, standing: Posture, formulation: 
 
 
 def missed(values: Array, lower: Array, upper: Array) -> Array:
-    """Return by how much values are below or above their limits, else zero; what is not a number stays none."""
+    """Return by how much values are below or above their limits, else zero; what is not a number stays none.
+
+    Args:
+        values: of any shape.
+        lower: of the same shape, or one that broadcasts to it.
+        upper: likewise.
+    """
     return np.maximum(np.maximum(lower - values, values - upper), 0.0)
 
 

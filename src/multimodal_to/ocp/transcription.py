@@ -131,6 +131,11 @@ def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
     """Return the NLP of `knots` + 1 knots of `size` variables each, and one Δt.
 
     Rows are ordered by stage, then interval, then row.
+
+    Args:
+        stages: in the order of their rows.
+        size: number of variables of a knot.
+        knots: N, the number of intervals.
     """
     count = size * (knots + 1) + 1
     x, p = cs.MX.sym("x", count), cs.MX.sym("p", 0)
@@ -188,7 +193,7 @@ def _mapped(function: cs.Function, repeats: int) -> cs.Function:
 
 def _derivative(function: cs.Function, repeats: int) -> cs.Function:
     """Return the same for a function that is not derived again, which may be machine code."""
-    return _mapped(function if repeats == 1 else compiled.kept(function), repeats)
+    return _mapped(function if repeats == 1 else compiled.machine_code(function), repeats)
 
 
 def _hessian(x: cs.MX, p: cs.MX, factor: cs.MX, multipliers: cs.MX, matrix: cs.MX) -> cs.Function:
@@ -214,7 +219,13 @@ class _Blocks:
         self._columns: list[Integers] = []
 
     def add(self, values: cs.MX, rows: Integers, columns: Integers) -> None:
-        """Add blocks: nonzeros (nnz, repeats), with rows and columns that broadcast to that shape."""
+        """Add blocks: nonzeros (nnz, repeats), with rows and columns that broadcast to that shape.
+
+        Args:
+            values: nonzeros of each block, (nnz, repeats).
+            rows: where they stand, of a shape that broadcasts to that of the values.
+            columns: likewise.
+        """
         shape = tuple(values.shape)
         self._values.append(cs.vec(values))
         self._rows.append(np.broadcast_to(rows, shape).ravel(order="F"))

@@ -106,6 +106,12 @@ class Bounds:
     def fix(self, name: str, knot: int, value: Array | float, within: float = 0.0) -> None:
         """Hold a variable at a value at one knot.
 
+        Args:
+            name: of the variable.
+            knot: which knot.
+            value: in the variable's unit, (dim,) or one number for all of its rows.
+            within: how far from the value it may be, in the same unit.
+
         Raises:
             ScenarioError: its range does not allow that value.
         """
@@ -121,7 +127,13 @@ class Bounds:
 
 
 def ranges(robot: Robot, scenario: Scenario, layout: Layout) -> Bounds:
-    """Return the box constraints that hold at every knot: limits of the robot, and of the scenario (eq. 28, 29)."""
+    """Return the box constraints that hold at every knot: limits of the robot, and of the scenario (eq. 28, 29).
+
+    Args:
+        robot: whose limits hold.
+        scenario: whose limits hold.
+        layout: of the variables of a knot.
+    """
     limits, jets, count = robot.joint_limits, robot.jets, scenario.knots + 1
     speed = scenario.base_speed_max
     reach = np.array(scenario.com_range)

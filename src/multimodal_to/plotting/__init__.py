@@ -52,6 +52,12 @@ FIGURES: Mapping[str, _Plot] = MappingProxyType(
 def plot(name: str, robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Return a figure by its name in `FIGURES`.
 
+    Args:
+        name: of the figure.
+        robot: of all trajectories.
+        *trajectories: to show together.
+        labels: of the trajectories in the legend; by default the names of their scenarios.
+
     Raises:
         InputError: there is none of that name, or the trajectories are for different robots or too many.
     """

@@ -82,7 +82,17 @@ def _cells(
     *,
     whole_range: bool,
 ) -> None:
-    """Draw one small panel for each joint; NaN limits are none."""
+    """Draw one small panel for each joint; NaN limits are none.
+
+    Args:
+        figure: an empty one.
+        runs: to draw.
+        values: of each run, (n, knots + 1), a row for each joint.
+        unit: title and unit of the values.
+        lower: limit of each joint, in the unit of the values, (n,).
+        upper: limit of each joint, in the unit of the values, (n,).
+        whole_range: show the limits even where the motion stays far from them.
+    """
     names = runs[0].robot.joint_names
     rows = -(-len(names) // _COLUMNS)
     grid = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False)

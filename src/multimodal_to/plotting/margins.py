@@ -39,8 +39,13 @@ def plot_margins(
 
     Dashed are the scenario's bounds on the products; that on slips holds along each of two tangents, so that ‖slip‖
     may be √2 as much. Both axes are logarithmic and end at 1e-8 and 1e-6; a property that has nothing to show, as a
-    penetration of less than zero, has no bar. A bar that passes 1 fails. `audits` are those to show; by default each
-    run is audited.
+    penetration of less than zero, has no bar. A bar that passes 1 fails.
+
+    Args:
+        robot: of all trajectories.
+        *trajectories: to show together.
+        labels: of the trajectories in the legend; by default the names of their scenarios.
+        audits: those to show, one for each trajectory; by default each is audited.
 
     Raises:
         InputError: the trajectories are for different robots, or too many.

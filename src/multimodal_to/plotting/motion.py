@@ -36,7 +36,13 @@ def plot_momentum(robot: Robot, *trajectories: Trajectory, labels: Sequence[str]
 
 
 def _components(runs: Sequence[Run], what: str, columns: Sequence[tuple[str, str, float]]) -> Figure:
-    """Draw quantities of three rows (name, title, least range of the axis): one column each."""
+    """Draw quantities of three rows (name, title, least range of the axis): one column each.
+
+    Args:
+        runs: to draw.
+        what: the figure's title says.
+        columns: name of the quantity in a `Trajectory`, title, and least range of the axis in its unit.
+    """
     figure = new_figure(runs, what, _SIZE)
     grid = figure.subplots(3, len(columns), sharex=True, squeeze=False)
     for column, (name, title, least) in enumerate(columns):

@@ -52,6 +52,11 @@ class Run:
 def runs_of(robot: Robot, trajectories: Sequence[Trajectory], labels: Sequence[str] | None) -> list[Run]:
     """Return the trajectories as the runs of one figure.
 
+    Args:
+        robot: of all trajectories.
+        trajectories: to show together.
+        labels: one for each; by default the names of their scenarios.
+
     Raises:
         InputError: there are none or too many, they are for different robots, or labels are not one for each.
     """
@@ -69,7 +74,13 @@ def runs_of(robot: Robot, trajectories: Sequence[Trajectory], labels: Sequence[s
 
 
 def new_figure(runs: Sequence[Run], what: str, size: tuple[float, float]) -> Figure:
-    """Return an empty figure with a title; several runs are told apart by line style, in a legend below."""
+    """Return an empty figure with a title; several runs are told apart by line style, in a legend below.
+
+    Args:
+        runs: that it will show.
+        what: it shows, for its title.
+        size: width and height [inch].
+    """
     figure = Figure(figsize=size, layout="constrained")
     names = list(dict.fromkeys(run.trajectory.scenario for run in runs))
     title = names[0] if len(names) == 1 else f"{len(names)} motions"  # which the legend names
@@ -83,7 +94,14 @@ def new_figure(runs: Sequence[Run], what: str, size: tuple[float, float]) -> Fig
 
 
 def draw_lines(axes: Axes, runs: Sequence[Run], values: Iterable[Array], names: Iterable[str]) -> None:
-    """Draw rows (rows, knots + 1) of each run: the colour tells the row, the style the run or, of one run, the row."""
+    """Draw rows (rows, knots + 1) of each run: the colour tells the row, the style the run or, of one run, the row.
+
+    Args:
+        axes: to draw in.
+        runs: whose times and styles.
+        values: of each run, (rows, knots + 1).
+        names: of the rows in the legend; rows beyond them have no entry.
+    """
     labels = list(names)
     for number, (run, rows) in enumerate(zip(runs, values, strict=True)):
         for index, row in enumerate(rows):
@@ -98,13 +116,25 @@ def draw_lines(axes: Axes, runs: Sequence[Run], values: Iterable[Array], names: 
 
 
 def draw_limits(axes: Axes, values: Iterable[float], label: str | None) -> None:
-    """Draw limits as dashed lines, with one entry in the legend."""
+    """Draw limits as dashed lines, with one entry in the legend.
+
+    Args:
+        axes: to draw in.
+        values: of the limits, in the unit of the axes.
+        label: in the legend; None for no entry.
+    """
     for index, value in enumerate(sorted(values)):
         axes.axhline(value, label=label if index == 0 else None, **LIMIT)
 
 
 def draw_flight(all_axes: Iterable[Axes], runs: Sequence[Run], labelled: Axes | None = None) -> None:
-    """Draw a translucent red band over the flight of every run, with one entry in the legend of one of the axes."""
+    """Draw a translucent red band over the flight of every run, with one entry in the legend of one of the axes.
+
+    Args:
+        all_axes: to draw in, with the time along x [s].
+        runs: whose flight.
+        labelled: the one of them with an entry in its legend.
+    """
     phases = [phase for run in runs for phase in flight_phases(run.trajectory)]
     look = FLIGHT | {"alpha": FLIGHT["alpha"] * min(1.0, 2.0 / len(runs))}  # bands that lie over each other add up
     for axes in all_axes:

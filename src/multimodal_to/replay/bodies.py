@@ -21,7 +21,13 @@ Drawn = tuple[Any, Any, Array]
 
 
 def link_paths(robot: Robot, appearance: Appearance, root: str) -> dict[str, str]:
-    """Return where in the scene the links are that have a shape or a jet: each below the nearest such link above it."""
+    """Return where in the scene the links are that have a shape or a jet: each below the nearest such link above it.
+
+    Args:
+        robot: whose links.
+        appearance: its visuals.
+        root: path in the scene that all links are below.
+    """
     described = parse_urdf(robot.urdf)
     shown = {visual.link for visual in appearance.visuals} | {jet.frame for jet in robot.jets}
     above = {joint.child: joint.parent for joint in described.joints}
@@ -38,7 +44,13 @@ def link_paths(robot: Robot, appearance: Appearance, root: str) -> dict[str, str
 
 
 def link_poses(robot: Robot, trajectory: Trajectory, paths: Mapping[str, str]) -> dict[str, Array]:
-    """Return the pose of each link in its parent in the scene at every knot, (knots + 1, 4, 4)."""
+    """Return the pose of each link in its parent in the scene at every knot, (knots + 1, 4, 4).
+
+    Args:
+        robot: whose links.
+        trajectory: its motion.
+        paths: path in the scene of each link, from `link_paths`.
+    """
     poses = {name: frame_poses(robot, trajectory, name) for name in paths}
     parents = {name: path.split("/")[-2] for name, path in paths.items()}
     return {
@@ -48,14 +60,26 @@ def link_poses(robot: Robot, trajectory: Trajectory, paths: Mapping[str, str]) -
 
 
 def draw_links(scene: Scene, paths: Mapping[str, str], poses: Mapping[str, Array]) -> None:
-    """Let the links of `paths` move as their poses say, (knots + 1, 4, 4) each."""
+    """Let the links of `paths` move as their poses say, (knots + 1, 4, 4) each.
+
+    Args:
+        scene: where to draw.
+        paths: path in the scene of each link, from `link_paths`.
+        poses: of each link in its parent in the scene at every knot, (knots + 1, 4, 4), from `link_poses`.
+    """
     for name, path in paths.items():
         scene.set(path, "position", poses[name][:, :3, 3])
         scene.set(path, "quaternion", quaternions(poses[name]))
 
 
 def draw_visuals(scene: Scene, paths: Mapping[str, str], visuals: Mapping[Visual, Drawn]) -> None:
-    """Put the visuals on their links."""
+    """Put the visuals on their links.
+
+    Args:
+        scene: where to draw.
+        paths: path in the scene of each link, from `link_paths`.
+        visuals: each visual as `drawn` or `faded` returns it.
+    """
     for visual, (geometry, material, transform) in visuals.items():
         scene.add(f"{paths[visual.link]}/{visual.name}", geometry, material, transform)
 

@@ -68,7 +68,14 @@ def draw_flames(
 
 
 def draw_contact_forces(scene: Scene, robot: Robot, trajectory: Trajectory, root: str = "contact_forces") -> None:
-    """Draw each contact force as an arrow that starts at its contact point."""
+    """Draw each contact force as an arrow that starts at its contact point.
+
+    Args:
+        scene: where to draw.
+        robot: whose weight is the measure of the arrows.
+        trajectory: whose contact positions [m] and forces [N].
+        root: path in the scene that all arrows are below.
+    """
     colour = shapes.MeshLambertMaterial(color=0x1FA34A, emissive=0x08401B)
     positions, forces = trajectory.per_contact("contact_positions"), trajectory.per_contact("contact_forces")
     for name, position, force in zip(trajectory.contact_names, positions, forces, strict=True):
@@ -104,7 +111,13 @@ def draw_com_trace(scene: Scene, trajectory: Trajectory) -> None:
 
 
 def _tube(points: Array, radius: float, sides: int = 6) -> SmoothMesh:
-    """Return one prism about each segment between points (n, 3), no two of which in a row coincide."""
+    """Return one prism about each segment between points, no two of which in a row coincide.
+
+    Args:
+        points: of the middle line [m], (n, 3).
+        radius: [m].
+        sides: of each prism.
+    """
     along = np.diff(points, axis=0) / np.linalg.norm(np.diff(points, axis=0), axis=1)[:, None]
     aside = np.cross(along, np.where(np.abs(along[:, 2:]) < 0.9, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]))
     aside /= np.linalg.norm(aside, axis=1)[:, None]
@@ -120,7 +133,14 @@ def _tube(points: Array, radius: float, sides: int = 6) -> SmoothMesh:
 
 
 def _plume(radius: float, length: float, rings: int = 14, sides: int = 24) -> SmoothMesh:
-    """Return a body of revolution about z that swells a little behind the nozzle and tapers off to a point."""
+    """Return a body of revolution about z that swells a little behind the nozzle and tapers off to a point.
+
+    Args:
+        radius: at the nozzle [m].
+        length: along z, as a share of the whole flame [1].
+        rings: of vertices along z.
+        sides: vertices of each ring.
+    """
     along = np.linspace(0.0, 1.0, rings)
     widths = radius * (1.0 + 0.6 * along) * (1.0 - along**1.6)
     angles = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
@@ -135,7 +155,13 @@ def _plume(radius: float, length: float, rings: int = 14, sides: int = 24) -> Sm
 
 
 def _stretch(scene: Scene, path: str, lengths: Array) -> None:
-    """Scale a node of length 1 along its z to a length [m] at every knot; hide it while it has none."""
+    """Scale a node of length 1 along its z to a length [m] at every knot; hide it while it has none.
+
+    Args:
+        scene: where the node is.
+        path: of the node.
+        lengths: at every knot [m], (knots + 1,).
+    """
     widths = np.minimum(1.0, lengths / _FULL_WIDTH_LENGTH)
     shown = lengths > 0.0
     scene.set(path, "scale", np.column_stack([widths, widths, lengths]))

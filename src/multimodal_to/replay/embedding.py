@@ -33,5 +33,12 @@ class Embedded:
 
 
 def embed(robot: Robot, trajectory: Trajectory, *, meshes: bool = True, height: int = 520) -> Embedded:
-    """Return the replay as a notebook shows it, in a frame of that height [pixel]; with meshes it has some 7 MB."""
+    """Return the replay as a notebook shows it, in a frame of that height [pixel]; with meshes it has some 7 MB.
+
+    Args:
+        robot: that moves.
+        trajectory: its motion.
+        meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
+        height: of the frame [pixel].
+    """
     return Embedded(page=page(robot, trajectory, meshes=meshes), height=height)

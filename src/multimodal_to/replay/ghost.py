@@ -28,7 +28,14 @@ def in_step(trajectory: Trajectory, ghost: Trajectory) -> Trajectory:
 
 
 def draw_ghost(scene: Scene, robot: Robot, ghost: Trajectory, look: Appearance) -> None:
-    """Draw the robot faint as it moves in the ghost, which is in step, and the way of its CoM."""
+    """Draw the robot faint as it moves in the ghost, which is in step, and the way of its CoM.
+
+    Args:
+        scene: where to draw.
+        robot: that moves.
+        ghost: its other motion, at the knots of the scene, from `in_step`.
+        look: the robot's visuals.
+    """
     paths = link_paths(robot, look, "ghost/robot")
     draw_links(scene, paths, link_poses(robot, ghost, paths))
     draw_visuals(scene, paths, faded({visual: drawn(visual) for visual in look.visuals}, GHOST_OPACITY))

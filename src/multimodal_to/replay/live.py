@@ -17,8 +17,14 @@ def show(
 ) -> meshcat.Visualizer:
     """Start meshcat's server, draw the motion there and return the visualizer; a browser at its `url()` plays it.
 
+    Args:
+        robot: that moves.
+        trajectory: its motion.
+        ghost: another motion of the same robot, drawn faint in the same scene; it begins when this one does.
+        meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
+
     Raises:
-        InputError: the ghost, another motion to be drawn faint, is not one of the same robot.
+        InputError: the ghost is not one of the same robot.
     """
     look = appearance(robot.urdf, meshes=meshes)
     with redirect_stdout(io.StringIO()):  # meshcat prints the address

@@ -48,6 +48,11 @@ class Part:
 def load_parts(uri: str, urdf: Path, scale: Array) -> list[Part]:
     """Return the triangles of a mesh that a URDF names, one part per colour of the file.
 
+    Args:
+        uri: the mesh's address as the URDF has it, see `find_mesh`.
+        urdf: the file that names it.
+        scale: of the mesh along its x, y and z [1], (3,).
+
     Raises:
         MultimodalError: the file is missing, outside its root, a git-LFS pointer, too large, or no mesh.
     """

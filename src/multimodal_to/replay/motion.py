@@ -59,10 +59,16 @@ def draw_motion(
 ) -> Picture:
     """Draw stage, robot, flames, contact forces and CoM, and set the animation that moves them, at true speed.
 
-    A `ghost` is another motion of the robot, drawn faint; it begins with this one.
-
     In meshcat's own `live` page the animation also moves the scene so that the camera follows, which ours does itself,
     and flames keep one brightness, since it knows the materials too late.
+
+    Args:
+        visualizer: meshcat's, whose window may be a `Recorder`.
+        robot: that moves.
+        trajectory: its motion.
+        look: the robot's visuals.
+        ghost: another motion of the same robot, drawn faint in the same scene; it begins when this one does.
+        live: draw for meshcat's own page.
     """
     scene = Scene(visualizer=visualizer, time=trajectory.time - trajectory.time[0])
     com = trajectory.com_position.T * [1.0, 1.0, 0.0]
@@ -101,6 +107,14 @@ def draw_still(
 
     Where it travels far enough from one to the next, ghosts stand where they were, the earlier the fainter; else they
     stand side by side, from left to right, which ground that is not flat forbids.
+
+    Args:
+        visualizer: meshcat's, whose window may be a `Recorder`.
+        robot: that moves.
+        trajectory: its motion.
+        times: that increase [s], (stills,).
+        look: the robot's visuals.
+        aspect: width over height of the picture.
 
     Raises:
         InputError: a time is not within the trajectory, or times do not increase.
@@ -147,7 +161,13 @@ def surface_of(trajectory: Trajectory) -> Surface:
 
 
 def _rises(surface: Surface, place: Array, direction: Array) -> bool:
-    """Return whether the ground a metre from a place in a direction is higher than a metre the other way."""
+    """Return whether the ground a metre from a place in a direction is higher than a metre the other way.
+
+    Args:
+        surface: the ground.
+        place: in the world [m], (3,).
+        direction: horizontal part in the world, of any length, (3,).
+    """
     step = np.array([*direction[:2], 0.0]) / np.linalg.norm(direction[:2])
     ahead, behind = heights_below(surface, np.column_stack([place + step, place - step]))
     return bool(ahead > behind + 0.01)
@@ -168,7 +188,14 @@ def _frozen(trajectory: Trajectory, instants: Array) -> list[Trajectory]:
 def _layout(
     robot: Robot, ghosts: list[Trajectory], visuals: tuple[Visual, ...], *, level: bool
 ) -> tuple[Array, Array, bool]:
-    """Return the camera's direction, how far each ghost is moved aside (ghosts, 3), and whether they were moved."""
+    """Return the camera's direction, how far each ghost is moved aside (ghosts, 3), and whether they were moved.
+
+    Args:
+        robot: that moves.
+        ghosts: the robot at each time, from `_frozen`.
+        visuals: of the robot.
+        level: the ground is flat, so that ghosts may be moved aside.
+    """
     low, high = _extent(robot, ghosts[0], visuals, np.zeros((2, 3)))
     width = float(np.linalg.norm((high - low)[:2])) / math.sqrt(2.0)
     places = np.array([ghost.com_position[:, 0] * [1.0, 1.0, 0.0] for ghost in ghosts])
@@ -201,7 +228,14 @@ def _view(boxes: Array, direction: Array, **more: float) -> View:
 
 
 def _extent(robot: Robot, trajectory: Trajectory, visuals: tuple[Visual, ...], moved: Array) -> tuple[Array, Array]:
-    """Return the corners of the box around the robot at all knots, each seen from `moved` (knots + 1, 3) [m]."""
+    """Return the corners of the box around the robot at all knots, each seen from `moved` (knots + 1, 3) [m].
+
+    Args:
+        robot: that moves.
+        trajectory: its motion.
+        visuals: of the robot.
+        moved: places in the world at the knots [m], (knots + 1, 3).
+    """
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for link, points in _points(visuals).items():
         poses = frame_poses(robot, trajectory, link)

@@ -39,7 +39,13 @@ def write_html(
     """Write one page that plays the motion in a browser, from disk, with networking off; whole or not at all.
 
     Opened with ``#t=2.5`` at its address's end, it stands still at 2.5 s; ``#t=2.5&bare`` hides the panels as well.
-    A `ghost` is another motion of the same robot, drawn faint: the plan of a simulation, or the other way round.
+
+    Args:
+        robot: that moves.
+        trajectory: its motion.
+        path: of the page.
+        ghost: another motion of the same robot, drawn faint: the plan of a simulation, or the other way round.
+        meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
 
     Raises:
         InputError: the ghost is not one of the same robot.
@@ -49,7 +55,14 @@ def write_html(
 
 
 def page(robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = None, meshes: bool = True) -> str:
-    """Return the page that `write_html` writes."""
+    """Return the page that `write_html` writes.
+
+    Args:
+        robot: that moves.
+        trajectory: its motion.
+        ghost: another motion of the same robot, drawn faint in the same scene; it begins when this one does.
+        meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
+    """
     return _page(trajectory, player(robot, trajectory, ghost=ghost, meshes=meshes))
 
 
@@ -64,6 +77,14 @@ def write_still_html(
 ) -> Path:
     """Write a page with the robot at several times [s] in one still scene, for a picture of that width over height.
 
+    Args:
+        robot: that moves.
+        trajectory: its motion.
+        times: that increase [s], (stills,).
+        path: of the page.
+        aspect: width over height of the picture.
+        meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
+
     Raises:
         InputError: a time is not within the trajectory.
         OutputError: the folder does not exist or cannot be written.
@@ -74,7 +95,14 @@ def write_still_html(
 
 
 def player(robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = None, meshes: bool = True) -> str:
-    """Return the HTML that plays the motion, for a page that has one: a block as high as what it stands in."""
+    """Return the HTML that plays the motion, for a page that has one: a block as high as what it stands in.
+
+    Args:
+        robot: that moves.
+        trajectory: its motion.
+        ghost: another motion of the same robot, drawn faint in the same scene; it begins when this one does.
+        meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
+    """
     recorder, look = Recorder(), appearance(robot.urdf, meshes=meshes)
     picture = draw_motion(meshcat.Visualizer(window=recorder), robot, trajectory, look, ghost=ghost)
     return _player(trajectory, recorder, picture, look.attribution, ghost)

@@ -42,8 +42,17 @@ def write_gif(
 ) -> Path:
     """Write the motion as a GIF that repeats, at true speed, of `rate` frames a second.
 
+    Args:
+        robot: that moves.
+        trajectory: its motion.
+        path: of the GIF.
+        rate: frames a second [1/s], at most 100.
+        size: width and height [pixel].
+        ghost: another motion of the same robot, drawn faint in the same scene; it begins when this one does.
+        meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
+
     Raises:
-        InputError: the rate is not positive, or the ghost, a motion to be drawn faint, is not one of the same robot.
+        InputError: the rate is not positive, or the ghost is not one of the same robot.
         OutputError: there is no browser, or the file cannot be written.
     """
     times = _frame_times(trajectory, rate)
@@ -72,8 +81,17 @@ def write_mp4(
 ) -> Path:
     """Write the motion as an MP4 (H.264), at true speed, of `rate` frames a second; the last pose stands for a second.
 
+    Args:
+        robot: that moves.
+        trajectory: its motion.
+        path: of the film.
+        rate: frames a second [1/s], at most 100.
+        size: width and height [pixel], even numbers.
+        ghost: another motion of the same robot, drawn faint in the same scene; it begins when this one does.
+        meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
+
     Raises:
-        InputError: the rate is not positive, or the ghost, a motion to be drawn faint, is not one of the same robot.
+        InputError: the rate is not positive, or the ghost is not one of the same robot.
         OutputError: there is no browser or no imageio-ffmpeg, or the file cannot be written.
     """
     try:
@@ -116,6 +134,14 @@ def write_snapshots(
     meshes: bool = True,
 ) -> Path:
     """Write one still picture (PNG) of the robot at several times [s]; `snapshot_times` without any.
+
+    Args:
+        robot: that moves.
+        trajectory: its motion.
+        path: of the picture.
+        times: that increase [s].
+        size: width and height [pixel]; by default room for each robot.
+        meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
 
     Raises:
         InputError: a time is not within the trajectory, or times do not increase.
@@ -166,7 +192,16 @@ def _frame_times(trajectory: Trajectory, rate: float) -> Array:
 def _film(
     robot: Robot, trajectory: Trajectory, times: Array, size: tuple[int, int], ghost: Trajectory | None, meshes: bool
 ) -> Iterator[bytes]:
-    """Return a picture of the page at each time [s], with its clock and without its buttons."""
+    """Return a picture of the page at each time [s], with its clock and without its buttons.
+
+    Args:
+        robot: that moves.
+        trajectory: its motion.
+        times: of the pictures, since the motion's start [s], (pictures,).
+        size: width and height [pixel].
+        ghost: another motion of the same robot, drawn faint in the same scene; it begins when this one does.
+        meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
+    """
     with tempfile.TemporaryDirectory() as folder:
         page = write_html(robot, trajectory, Path(folder) / "film.html", ghost=ghost, meshes=meshes)
         with open_browser(size) as browser:

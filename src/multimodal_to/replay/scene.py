@@ -92,7 +92,15 @@ class Scene:
     animation: Animation = field(default_factory=lambda: Animation(default_framerate=1))
 
     def add(self, path: str, shape: Any, material: Any, transform: Array, *, shadow: bool = True) -> None:
-        """Put a shape at a fixed place in its parent."""
+        """Put a shape at a fixed place in its parent.
+
+        Args:
+            path: of the new node in the scene.
+            shape: meshcat's geometry, or an object that needs no material.
+            material: meshcat's; None for such an object.
+            transform: of the shape in its parent node, (4, 4) [m].
+            shadow: let it cast one.
+        """
         self.visualizer[path].set_object(shape, material)
         self.visualizer[path].set_transform(transform)
         if not shadow:  # meshcat's `set_property` would write the key in small letters
@@ -101,7 +109,13 @@ class Scene:
             self.visualizer.window.send(Command(content=content))
 
     def set(self, path: str, key: str, values: Array) -> None:
-        """Give a node its property at every knot, (knots + 1, ...): as keyframes, or once if it never changes."""
+        """Give a node its property at every knot, (knots + 1, ...): as keyframes, or once if it never changes.
+
+        Args:
+            path: of the node in the scene.
+            key: name of the property, one of `_TRACK_TYPES`.
+            values: of the property at every knot, (knots + 1, ...).
+        """
         node = self.visualizer[path]
         if np.abs(values.astype(float) - values[0]).max() < _STILL:
             node.set_property(key, values[0].tolist())
@@ -109,7 +123,13 @@ class Scene:
         self.move(path, key, values)
 
     def move(self, path: str, key: str, values: Array) -> None:
-        """Give a node keyframes of a property at every knot, (knots + 1, ...)."""
+        """Give a node keyframes of a property at every knot, (knots + 1, ...).
+
+        Args:
+            path: of the node in the scene; empty for its root.
+            key: name of the property, one of `_TRACK_TYPES`.
+            values: of the property at every knot, (knots + 1, ...).
+        """
         node = self.visualizer[path] if path else self.visualizer
         clip = self.animation.clips.setdefault(node.path, AnimationClip(fps=1))  # a frame is a second
         times, keys = self.time.tolist(), values.tolist()

@@ -43,7 +43,11 @@ class View:
 def draw_stage(scene: Scene, view: View, surface: Surface, reach: float = 0.0) -> None:
     """Draw background, ground, lights and camera; the view's middle becomes the origin that the camera turns about.
 
-    The ground goes on for `reach` [m] beyond what is seen at once, for a camera that follows.
+    Args:
+        scene: where to draw.
+        view: what the camera has to see.
+        surface: the ground.
+        reach: how far the ground goes on beyond what is seen at once [m], for a camera that follows.
     """
     visualizer = scene.visualizer
     visualizer["/Background"].set_property("top_color", [0.55, 0.64, 0.74])
@@ -60,7 +64,14 @@ def draw_stage(scene: Scene, view: View, surface: Surface, reach: float = 0.0) -
 
 
 def _draw_ground(scene: Scene, view: View, surface: Surface, reach: float) -> None:
-    """Draw the ground: a disc with a grid where it is flat, else a patch of it with lines that show its shape."""
+    """Draw the ground: a disc with a grid where it is flat, else a patch of it with lines that show its shape.
+
+    Args:
+        scene: where to draw.
+        view: what the camera has to see.
+        surface: the ground.
+        reach: how far it goes on beyond what is seen at once [m].
+    """
     if not isinstance(surface, FlatGround):
         terrain = patch(surface, view.middle[:2], view.width / 2 + reach + _TERRAIN_AROUND)
         one, two, three = (terrain.vertices[terrain.faces[:, corner]] for corner in range(3))

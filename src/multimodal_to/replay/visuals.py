@@ -68,7 +68,17 @@ def appearance(urdf: Path, *, meshes: bool = True) -> Appearance:
 def _shapes(
     link: str, name: str, visual: Any, urdf: Path, palette: Mapping[str, Any], problems: dict[str, str], meshes: bool
 ) -> list[Visual]:
-    """Return the shapes of one <visual>: none for a mesh that cannot be drawn."""
+    """Return the shapes of one <visual>: none for a mesh that cannot be drawn.
+
+    Args:
+        link: name of the link that has the visual.
+        name: of the visual in the scene.
+        visual: as `parse_urdf` has it.
+        urdf: the file, from which paths of meshes are relative.
+        palette: materials of the robot by name.
+        problems: takes why a mesh cannot be drawn, by its address.
+        meshes: look for meshes at all.
+    """
     origin = np.eye(4) if visual.origin is None else visual.origin
     stated = _stated_colour(visual, palette)
     mesh = visual.geometry.mesh
@@ -106,7 +116,13 @@ def _stated_colour(visual: Any, palette: Mapping[str, Any]) -> tuple[float, ...]
 
 
 def _dressed(dress: Dress, robot: Any, problems: dict[str, str]) -> list[Visual]:
-    """Return the meshes of the other model as visuals of this robot's links."""
+    """Return the meshes of the other model as visuals of this robot's links.
+
+    Args:
+        dress: which visuals of the other model go where.
+        robot: this one, as `parse_urdf` has it.
+        problems: takes why a mesh cannot be drawn, by its address.
+    """
     other = parse_urdf(dress.urdf)
     links, palette = {link.name: link for link in other.links}, {entry.name: entry for entry in other.materials}
     found = []

@@ -38,7 +38,14 @@ def _number(value: float | None, form: str) -> str:
 
 
 def _worst(title: str, name: str, form: str, of_published: Callable[[PublishedRun], str] = _unknown) -> Column:
-    """Return the column of a property of the audit."""
+    """Return the column of a property of the audit.
+
+    Args:
+        title: of the column.
+        name: of the property in the audit.
+        form: format of its worst value.
+        of_published: text for figures of the paper.
+    """
     return Column(title=title, of_run=lambda run: format(run.report[name].worst, form), of_published=of_published)
 
 

@@ -42,6 +42,12 @@ _CAPTIONS: Mapping[str, str] = {
 def write_report(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *, meshes: bool = True) -> Path:
     """Write the report of a motion as one page that opens from disk; whole or not at all.
 
+    Args:
+        robot: that moves.
+        trajectory: its motion, with the scenario and the record of its solve where it keeps them.
+        path: of the page.
+        meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
+
     Raises:
         InputError: the trajectory is for another robot.
         OutputError: the folder does not exist or cannot be written.
@@ -111,7 +117,7 @@ def _solve_facts(record: Mapping[str, Any], unusual: str = "") -> dict[str, str]
     costliest = sorted(_numbers(costs).items(), key=lambda entry: -entry[1])[:_COSTLIEST]
     return {
         "status": " · ".join(str(record[name]) for name in ("status", "message") if record.get(name)),
-        "kept": "the best iterate of a solve that had not ended" if record.get("kind") == "checkpoint" else "",
+        "unfinished": "the best iterate of a solve that had not ended" if record.get("kind") == "checkpoint" else "",
         "iterations": str(record.get("iterations", "")),
         "time in the solver": _measured(record, "solve_time", ".1f", " s"),
         "objective": _measured(record, "objective", ".6g", ""),

@@ -41,7 +41,14 @@ class Run:
 
 
 def reproduce(robot: Robot, scenario: Scenario, solver: Ipopt | None = None, progress: Progress | None = None) -> Run:
-    """Solve a scenario from its plain start guess and audit the answer."""
+    """Solve a scenario from its plain start guess and audit the answer.
+
+    Args:
+        robot: that moves.
+        scenario: to solve.
+        solver: by default `Ipopt()`.
+        progress: told of every iteration; it may stop the solve by returning True.
+    """
     started = time.perf_counter()
     problem = build(robot, scenario)
     solution = solve(problem, solver, progress)

@@ -25,7 +25,13 @@ class States:
 
 
 def random_states(robot: Robot, count: int, seed: int = 0) -> States:
-    """Return states all over the robot's range of joints, turned any way, with velocities and accelerations of 1."""
+    """Return states all over the robot's range of joints, turned any way, with velocities and accelerations of 1.
+
+    Args:
+        robot: whose range of joints.
+        count: how many.
+        seed: of the random numbers; the same seed gives the same states.
+    """
     rng = np.random.default_rng(seed)
     limits, size = robot.joint_limits, 6 + len(robot.joint_names)
     turns = rng.normal(size=(4, count))

@@ -72,7 +72,16 @@ class SimulationModel:
         velocity: Array,
         joint_velocities: Array,
     ) -> None:
-        """Put `data` into a state; the velocity is (ṗ, ω) of the base in world axes, (6,)."""
+        """Put `data` into a state.
+
+        Args:
+            data: MuJoCo's `MjData` of this model.
+            position: p of the base in the world [m], (3,).
+            quaternion_xyzw: of the base in the world, of any length, (4,).
+            joints: s in the robot's order [rad or m], (n,).
+            velocity: (ṗ, ω) of the base in world axes [m/s, rad/s], (6,).
+            joint_velocities: ṡ in the robot's order [rad/s or m/s], (n,).
+        """
         turn = np.zeros(9)
         data.qpos[:3], data.qpos[3:7] = position, quaternion_xyzw[[3, 0, 1, 2]] / np.linalg.norm(quaternion_xyzw)
         data.qpos[self.joint_positions] = joints
@@ -186,7 +195,14 @@ def _quaternion(mujoco: ModuleType, rotation: Array) -> Array:
 
 
 def _hold(mujoco: ModuleType, body: Any, joint: Joint, value: float) -> None:
-    """Put a body where its joint is at a value [rad or m]."""
+    """Put a body where its joint is at a value [rad or m].
+
+    Args:
+        mujoco: the package.
+        body: the joint's child.
+        joint: that is held.
+        value: where [rad or m].
+    """
     if joint.kind == "prismatic":
         body.pos = joint.translation + joint.rotation @ joint.axis * value
         return
@@ -197,7 +213,16 @@ def _hold(mujoco: ModuleType, body: Any, joint: Joint, value: float) -> None:
 
 
 def _add_ground(mujoco: ModuleType, spec: Any, surface: Surface, mu: float, middle: Array, reach: float) -> None:
-    """Add the ground, one radius of the contact points deeper along its normal."""
+    """Add the ground, one radius of the contact points deeper along its normal.
+
+    Args:
+        mujoco: the package.
+        spec: the model that is being made.
+        surface: the ground.
+        mu: Coulomb's friction coefficient [1].
+        middle: of a ground that is no plane, in the world [m], (2,).
+        reach: how far that goes to each side [m].
+    """
     contact = {"condim": 3, "friction": [mu, 0.0, 0.0], "solref": [CONTACT_TIME, 1.0], "contype": 0, "conaffinity": 1}
     if isinstance(surface, FlatGround | Plane):
         at = np.array([0.0, 0.0, surface.height])

@@ -59,6 +59,12 @@ def play(robot: Robot, plan: Trajectory, *, stabilise: bool = True, delay: float
     Without `stabilise` only the joints' servos close a loop, and turbines get the planned throttle. The motion follows
     thrusts, contact forces and torques by `delay` intervals of the plan, as `reference` says.
 
+    Args:
+        robot: that moves.
+        plan: its motion, with the scenario that it was solved for where it keeps one.
+        stabilise: let the stabiliser correct thrusts, contact forces and joints.
+        delay: of the motion after its forces, from 0 to 1 intervals of the plan.
+
     Raises:
         OutputError: MuJoCo is not installed.
         InputError: the delay is not from 0 to 1.
@@ -220,7 +226,14 @@ class _Player:
 
 
 def _throttle(jet: Jet, thrust: float, rate: float, acceleration: float) -> float:
-    """Return the throttle within its range whose T̈ comes nearest to the one wanted: u + B_UU u² = (T̈ − f) / g."""
+    """Return the throttle within its range whose T̈ comes nearest to the one wanted: u + B_UU u² = (T̈ − f) / g.
+
+    Args:
+        jet: with its model and range.
+        thrust: T [N].
+        rate: Ṫ [N/s].
+        acceleration: T̈ that is wanted [N/s²].
+    """
     model: Any = jet.model
     gain = model.B_U + model.B_T * thrust + model.B_D * rate
     wanted = (acceleration - float(model.acceleration(thrust, rate, 0.0))) / gain

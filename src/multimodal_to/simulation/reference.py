@@ -37,6 +37,12 @@ def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) 
     interval later than positions; its throttle is held as well. So the velocity changes from that of knot k to that of
     k + 1 about t_k, when it is the forces of knot k + 1 that change it: with a `delay` of one interval the whole motion
     is read that much earlier than thrusts, contact forces and torques, and accelerates when they act.
+
+    Args:
+        robot: that moves.
+        plan: its motion.
+        times: since the plan's start [s], (steps,).
+        delay: of the motion after its forces, in intervals of the plan.
     """
     knots = plan.time - plan.time[0]
     interval = plan.duration / plan.knots

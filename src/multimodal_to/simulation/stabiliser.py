@@ -81,7 +81,17 @@ def correct(
     inertia: Array,
     friction: float,
 ) -> Correction:
-    """Return what to add to step `step` of the plan in the state of `data`, whose subtree velocities are known."""
+    """Return what to add to step `step` of the plan in the state of `data`.
+
+    Args:
+        simulation: the model, and where its numbers stand.
+        data: MuJoCo's `MjData` of the state, with subtree velocities known.
+        plan: on the grid of the simulation.
+        step: row of the plan.
+        turbines: the jets as they are.
+        inertia: I about the CoM [kg m²], (3, 3).
+        friction: Coulomb's μ [1].
+    """
     robot = simulation.robot
     com, points = data.subtree_com[1], data.geom_xpos[simulation.points]
     loads = np.maximum(plan.contact_forces[step][:, 2], 0.0)
@@ -123,7 +133,16 @@ def rotation_vector(rotation: Array) -> Array:
 
 
 def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, inertia: Array, free: float) -> Array:
-    """Return Δl̇ [N] and Δḣω [N m] about the CoM, (6,)."""
+    """Return Δl̇ [N] and Δḣω [N m] about the CoM, (6,).
+
+    Args:
+        simulation: the model, and where its numbers stand.
+        data: MuJoCo's `MjData` of it.
+        plan: on the grid of the simulation.
+        step: row of the plan.
+        inertia: I about the CoM [kg m²], (3, 3).
+        free: share of the weight that the ground does not carry, from 0 to 1.
+    """
     robot = simulation.robot
     away, slow = plan.com[step] - data.subtree_com[1], plan.com_velocity[step] - data.subtree_linvel[1]
     linear = robot.mass * (COM_STIFFNESS * away + COM_DAMPING * slow)
@@ -136,7 +155,13 @@ def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, 
 
 
 def _about(origin: Array, before: Array, wrench: Array) -> Array:
-    """Return a wrench about `origin` that is given about `before`, (6,)."""
+    """Return a wrench about `origin` that is given about `before`, (6,).
+
+    Args:
+        origin: of the moment that is returned, in the world [m], (3,).
+        before: origin of the moment that is given, in the world [m], (3,).
+        wrench: force [N] and moment [N m] in world axes, (6,).
+    """
     return np.concatenate([wrench[:3], wrench[3:] + _skew(before - origin) @ wrench[:3]])
 
 
@@ -163,7 +188,17 @@ def _thrusts(
     planned: Array,
     weights: Array,
 ) -> tuple[Array, Array]:
-    """Return ΔT, and what the thrusts as they are leave of the wanted wrench about `origin`."""
+    """Return ΔT, and what the thrusts as they are leave of the wanted wrench about `origin`.
+
+    Args:
+        simulation: the model, and where its numbers stand.
+        data: MuJoCo's `MjData` of it.
+        wanted: change of force [N] and moment [N m] about `origin`, world axes, (6,).
+        origin: in the world [m], (3,).
+        turbines: the jets as they are.
+        planned: thrusts of the plan [N], (jets,).
+        weights: W, of forces [1/N] and moments [1/(N m)], (6,).
+    """
     axes = _axes(simulation, data)
     wrenches = np.vstack([axes.T, np.cross(data.site_xpos[simulation.jets] - origin, axes).T])
     off, spread = turbines.thrust - planned, np.full(len(axes), THRUST_SPREAD)
@@ -176,7 +211,14 @@ def _thrusts(
 
 
 def _contact_forces(planned: Array, arms: Array, wanted: Array, friction: float) -> Array:
-    """Return Δf of contact points with planned forces and arms from the CoM, (points, 3)."""
+    """Return Δf of contact points with planned forces and arms from the CoM, (points, 3).
+
+    Args:
+        planned: forces of the plan in world axes [N], (points, 3).
+        arms: from the CoM to the points, world axes [m], (points, 3).
+        wanted: change of force [N] and moment [N m] about the CoM, world axes, (6,).
+        friction: Coulomb's μ [1].
+    """
     wrenches = np.hstack([np.vstack([np.eye(3), _skew(arm)]) for arm in arms])
     spread = (LOAD_SPREAD * planned[:, 2:] * [friction, friction, 1.0]).ravel()
     total = planned + _ridge(wrenches, wanted, spread, FORCE_WEIGHTS).reshape(-1, 3)
@@ -190,6 +232,13 @@ def _effect_of_joints(simulation: SimulationModel, data: Any, origin: Array, thr
     """Return ∂w/∂s, (6, n): how joints above the base move the wrench of the thrusts, and the weight where it stands.
 
     With thrust f at p: ∂f = ω × f, and the moment (p − o) × f changes with all three; o is the CoM in flight.
+
+    Args:
+        simulation: the model, and where its numbers stand.
+        data: MuJoCo's `MjData` of it.
+        origin: o, of the moments, in the world [m], (3,).
+        thrust: of each jet [N], (jets,).
+        stands: a foot carries load, so that the weight has a moment about `origin`.
     """
     mujoco, model = mujoco_module(), simulation.model
     linear, angular, of_com = (np.zeros((3, model.nv)) for _ in range(3))
@@ -207,7 +256,14 @@ def _effect_of_joints(simulation: SimulationModel, data: Any, origin: Array, thr
 
 
 def _ridge(matrix: Array, target: Array, spread: Array, weights: Array) -> Array:
-    """Return z of least ‖W (A z − b)‖² + ‖z / σ‖², by the (6, 6) system of its dual."""
+    """Return z of least ‖W (A z − b)‖² + ‖z / σ‖², by the (6, 6) system of its dual.
+
+    Args:
+        matrix: A, (6, k).
+        target: b, (6,).
+        spread: σ, in the units of z, (k,).
+        weights: diagonal of W, (6,).
+    """
     scaled = weights[:, None] * matrix * spread
     return np.asarray(spread * (scaled.T @ np.linalg.solve(scaled @ scaled.T + np.eye(6), weights * target)))
 

@@ -54,26 +54,39 @@ class Best:
 
     def __init__(self, problem: Problem, checkpoint: Checkpoint | None = None) -> None:
         self._problem, self._checkpoint = problem, checkpoint
-        self._kept: Candidate | None = None
-        self.seen = 0  # iterates of the solver
+        self._best: Candidate | None = None
 
     def seed(self, x: Array, label: str) -> None:
         """Keep what a solve starts from, so that it ends with nothing worse."""
         self._keep(self._evaluated(x, 0, label))
 
     def show(self, x: Array, rows: Array, objective: float, iteration: int, label: str) -> None:
-        """Keep an iterate, with its rows g(x), if it is better than the one kept, and see to the checkpoint."""
-        self.seen += 1
+        """Keep an iterate, with its rows g(x), if it is better than the one kept, and see to the checkpoint.
+
+        Args:
+            x: all variables, in solver units.
+            rows: g(x), in solver units.
+            objective: f(x).
+            iteration: its number in the solve.
+            label: as in `Watch`.
+        """
         violation = self._problem.scaled_violation(x, rows)
         self._keep(Candidate(x=x, iteration=iteration, label=label, objective=objective, violation=violation))
-        if self._checkpoint is not None and self._kept is not None:
-            self._checkpoint.update(self._problem, self._kept, iteration)
+        if self._checkpoint is not None and self._best is not None:
+            self._checkpoint.update(self._problem, self._best, iteration)
 
     def end(self, x: Array, iteration: int, label: str, *, answer: bool) -> Candidate:
-        """Return what a solve ends with: the solver's last x if that is an answer, else the best iterate."""
+        """Return what a solve ends with: the solver's last x if that is an answer, else the best iterate.
+
+        Args:
+            x: the solver's last variables, in solver units.
+            iteration: its number in the solve.
+            label: as in `Watch`.
+            answer: whether the solver calls it one.
+        """
         last = self._evaluated(x, iteration, label)
         self._keep(last)
-        return last if answer or self._kept is None else self._kept
+        return last if answer or self._best is None else self._best
 
     def _evaluated(self, x: Array, iteration: int, label: str) -> Candidate:
         violation = self._problem.scaled_violation(x, self._problem.rows_at(x))
@@ -81,8 +94,8 @@ class Best:
         return Candidate(x=x, iteration=iteration, label=label, objective=objective, violation=violation)
 
     def _keep(self, new: Candidate) -> None:
-        if new.finite and (self._kept is None or new.better_than(self._kept)):
-            self._kept = new
+        if new.finite and (self._best is None or new.better_than(self._best)):
+            self._best = new
 
 
 class Checkpoint:
@@ -93,35 +106,40 @@ class Checkpoint:
         self._started = self._written_at = time.perf_counter()
         self._written: Candidate | None = None
 
-    def update(self, problem: Problem, kept: Candidate, iterations: int) -> None:
+    def update(self, problem: Problem, best: Candidate, iterations: int) -> None:
         """Write what is kept if it is new and time has passed, or if it is the first feasible one.
 
         A file that cannot be written is a warning, once: the solve is worth more than its checkpoint.
+
+        Args:
+            problem: that is solved.
+            best: the best iterate so far.
+            iterations: of the solve so far.
         """
-        now, first_feasible = time.perf_counter(), kept.feasible and not (self._written and self._written.feasible)
-        if kept is self._written or (now - self._written_at < CHECKPOINT_EVERY and not first_feasible):
+        now, first_feasible = time.perf_counter(), best.feasible and not (self._written and self._written.feasible)
+        if best is self._written or (now - self._written_at < CHECKPOINT_EVERY and not first_feasible):
             return
         try:
-            motion(problem, kept.x, self._record(problem, kept, iterations)).save(self._path)
+            motion(problem, best.x, self._record(problem, best, iterations)).save(self._path)
         except OutputError as error:
             if not math.isinf(self._written_at):
                 warnings.warn(f"the solve goes on without a checkpoint: {error}", stacklevel=2)
             self._written_at = math.inf
             return
-        self._written, self._written_at = kept, time.perf_counter()
+        self._written, self._written_at = best, time.perf_counter()
 
-    def _record(self, problem: Problem, kept: Candidate, iterations: int) -> str:
+    def _record(self, problem: Problem, best: Candidate, iterations: int) -> str:
         return to_json(
             kind=Kind.CHECKPOINT,
             status="running",
             message="",
             iterations=iterations,
             solve_time=time.perf_counter() - self._started,
-            objective=kept.objective,
-            costs=problem.costs(kept.x),
-            violations=problem.largest_violations(kept.x),
-            iteration=kept.iteration,
-            feasible=kept.feasible,
-            **{"pass": kept.label},
+            objective=best.objective,
+            costs=problem.costs(best.x),
+            violations=problem.largest_violations(best.x),
+            iteration=best.iteration,
+            feasible=best.feasible,
+            **{"pass": best.label},
             **self._environment,
         )

@@ -92,6 +92,11 @@ class Ipopt:
     def options(self, iterations: int, seconds: float, which: Pass) -> dict[str, Any]:
         """Return IPOPT's own options for a pass within a budget.
 
+        Args:
+            iterations: the most that are left.
+            seconds: the most that are left [s].
+            which: the pass.
+
         Raises:
             SolverError: the linear solver is not here, or does not work.
         """
@@ -135,6 +140,11 @@ class Ipopt:
 
     def run(self, problem: Problem, start: StartPoint, watch: Watch) -> Ending:
         """Minimise in the passes that the start needs; limits are for all of them together.
+
+        Args:
+            problem: that is solved.
+            start: where to start.
+            watch: called with every iterate.
 
         Raises:
             SolverError: IPOPT could not be run, or its linear solver is not here.

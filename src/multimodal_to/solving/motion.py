@@ -13,7 +13,13 @@ from multimodal_to.trajectory import Trajectory
 
 
 def motion(problem: Problem, x: Array, solve_json: str = "") -> Trajectory:
-    """Return the trajectory of x: the variables in their own units, and the differences that are their rates."""
+    """Return the trajectory of x: the variables in their own units, and the differences that are their rates.
+
+    Args:
+        problem: whose variables they are.
+        x: all variables, in solver units.
+        solve_json: how it was solved, as `solving.record` writes it.
+    """
     own = x * problem.scale
     values = {name: np.array(value) for name, value in problem.layout.read_horizon(own).items()}
     dt, robot = float(own[-1]), problem.robot

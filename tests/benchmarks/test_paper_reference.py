@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import multimodal_to as mt
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import paper_reference
 
 KNOTS = 3

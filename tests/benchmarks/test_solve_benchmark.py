@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import multimodal_to as mt
+import solve
 from multimodal_to.scenarios.files import to_toml
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-import solve
-
-PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
+PAGE = Path(__file__).parents[2] / "docs" / "performance.md"
 
 
 @pytest.fixture(scope="module")
