@@ -95,7 +95,16 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
 
 
 def _findings(worst: Sequence[Worst], robot: Robot, scenario: Scenario | None) -> tuple[Finding, ...]:
-    """Return the worst values with the limits of the table, or those that the scenario allows where they are wider."""
+    """Return the worst values with their limits.
+
+    Args:
+        worst: one for each property, in order.
+        robot: that a limit may depend on.
+        scenario: whose allowances may widen a limit.
+
+    Raises:
+        InputError: the scenario allows more of a property that is not judged.
+    """
     if scenario:
         check_allowances(robot, scenario)
     allowances = scenario.allowances if scenario else {}
@@ -113,7 +122,13 @@ def _findings(worst: Sequence[Worst], robot: Robot, scenario: Scenario | None) -
 
 
 def _within(finding: Finding, robot: Robot, scenario: Scenario | None) -> bool:
-    """Return whether a finding holds without an allowance."""
+    """Return whether a finding holds without an allowance.
+
+    Args:
+        finding: with the widened limit.
+        robot: that the own limit may depend on.
+        scenario: that the own limit may depend on.
+    """
     return finding.worst <= PROPERTIES[finding.name].limit_for(robot, scenario)
 
 

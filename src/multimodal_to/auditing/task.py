@@ -58,12 +58,26 @@ def _between(motion: Motion, scenario: Scenario) -> list[Worst]:
 
 
 def _com(name: str, motion: Motion, knot: int, target: tuple[float, float, float]) -> Worst:
+    """Return how far the CoM is from where it should be.
+
+    Args:
+        name: of the property.
+        motion: that is judged.
+        knot: at which.
+        target: position of the CoM in the world [m].
+    """
     off = np.abs(motion.trajectory.com_position[:, knot] - target)[:, None]
     return worst_of(name, off, ("x", "y", "z"), first=knot)
 
 
 def _rest(when: str, motion: Motion, knot: int) -> list[Worst]:
-    """Nothing moves: not the CoM, the base or a joint, and there is no angular momentum."""
+    """Nothing moves: not the CoM, the base or a joint, and there is no angular momentum.
+
+    Args:
+        when: "start" or "end", with which the properties' names begin.
+        motion: that is judged.
+        knot: at which.
+    """
     trajectory = motion.trajectory
     speeds = np.concatenate([getattr(trajectory, name)[:, knot] for name in _SPEEDS])
     momentum = trajectory.angular_momentum[:, knot]
@@ -74,14 +88,27 @@ def _rest(when: str, motion: Motion, knot: int) -> list[Worst]:
 
 
 def _standing(when: str, motion: Motion, knot: int, scenario: Scenario) -> list[Worst]:
-    """Every contact point is on the ground."""
+    """Every contact point is on the ground.
+
+    Args:
+        when: "start" or "end", with which the property's name begins.
+        motion: that is judged.
+        knot: at which.
+        scenario: with the ground.
+    """
     points = motion.points[:, knot].T
     heights = np.array(frame_function(scenario.surface).map(points.shape[1])(points)[0])
     return [worst_of(f"{when}: feet off the ground", np.abs(heights).T, motion.robot.contact_names, knot)]
 
 
 def _hover(when: str, motion: Motion, knot: int) -> list[Worst]:
-    """No contact force, an upright base, and thrusts that carry the weight and hold still."""
+    """No contact force, an upright base, and thrusts that carry the weight and hold still.
+
+    Args:
+        when: "start" or "end", with which the properties' names begin.
+        motion: that is judged.
+        knot: at which.
+    """
     trajectory, weight = motion.trajectory, motion.robot.mass * motion.robot.gravity
     tilt = 2 * np.abs(trajectory.base_quaternion_xyzw[:3, knot])
     return [
@@ -97,7 +124,13 @@ def _no_thrust(motion: Motion) -> Worst:
 
 
 def _equilibrium(when: str, motion: Motion, knot: int) -> list[Worst]:
-    """Contact forces, thrusts and weight are in static equilibrium, whatever accelerations the file states."""
+    """Contact forces, thrusts and weight are in static equilibrium, whatever accelerations the file states.
+
+    Args:
+        when: "start" or "end", with which the properties' names begin.
+        motion: that is judged.
+        knot: at which.
+    """
     robot, com = motion.robot, motion.trajectory.com_position[:, knot]
     forces = np.concatenate([motion.contact_forces[:, knot], motion.thrusts[:, knot]])
     points = np.concatenate([motion.points[:, knot], motion.thrust_points[:, knot]])
@@ -109,5 +142,11 @@ def _equilibrium(when: str, motion: Motion, knot: int) -> list[Worst]:
 
 
 def _at(name: str, knot: int, values: Array) -> Worst:
-    """Return the largest of a property's values at one knot, in the property's unit."""
+    """Return the largest of a property's values at one knot.
+
+    Args:
+        name: of the property.
+        knot: at which.
+        values: of any shape, in the property's unit.
+    """
     return Worst(name=name, worst=float(values.max(initial=0.0)), knot=knot)
