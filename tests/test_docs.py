@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import tomllib
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
@@ -160,3 +160,18 @@ def test_every_key_of_the_bundled_robots_file_is_on_its_page():
     }
     names = [prefix + key for prefix, some in tables.items() for key in some]
     assert [name for name in names if f"| `{name}` | " not in text] == []
+
+
+# ------------------------------------------------------------------------------------------ it does not converge
+
+
+def test_the_page_on_convergence_quotes_the_doctor_and_knows_every_status_and_term(ironcub):
+    text = (ROOT / "docs/not-converging.md").read_text(encoding="utf-8")
+    diagnosis = mt.doctor(ironcub, replace(mt.scenarios.take_off(), knots=30))
+    assert f"```text\nerror: {diagnosis.findings[0]}\n```" in text
+    rows = [line for line in text.splitlines() if line.startswith("| `")]
+    assert [status.value for status in mt.Status if not any(f"`{status.value}`" in row for row in rows)] == []
+    terms = {term.name for term in mt.Formulation.paper().terms}
+    quoted = re.findall(r"(?:not met|gives way): (\w+) at knot", text)
+    assert quoted
+    assert set(quoted) <= terms
