@@ -1,4 +1,4 @@
-"""How far plans survive MuJoCo: the table of docs/simulation.md.
+"""How far plans survive MuJoCo: the table of docs/playback.md.
 
     python benchmarks/simulation.py [SCENARIO | TRAJECTORY.npz ...] [--trials 0] [--seed 1]
 

@@ -1,7 +1,8 @@
 """Draw the pictures of the README and set its table of results: python docs/make_pictures.py.
 
-Both come from what `multimodal-to reproduce` wrote to results/; the table is also that of docs/scenarios.md. Needs
-Chromium (`apt-get install chromium`), which takes the snapshots, and icub-models (`pip install '.[meshes]'`).
+Both come from what `multimodal-to reproduce` wrote to results/. The README has the first of its two tables, with its
+note; docs/results.md has both. Needs Chromium (`apt-get install chromium`), which takes the snapshots, and
+icub-models (`pip install '.[meshes]'`).
 """
 
 from pathlib import Path
@@ -38,10 +39,15 @@ def main() -> None:
             write_snapshots(robot, trajectory, ROOT / "docs" / "take-off.png")
     for name in mt.scenarios.SCENARIOS:
         draw_snapshots(robot, mt.Trajectory.load(RESULTS / name / "trajectory.npz"), name)
-    for page in (ROOT / "README.md", ROOT / "docs" / "scenarios.md"):
-        before, rest = page.read_text(encoding="utf-8").split(BEGIN)
-        table = (RESULTS / "table.md").read_text(encoding="utf-8")
-        page.write_text(f"{before}{BEGIN}\n{table}{END}{rest.split(END)[1]}", encoding="utf-8")
+    tables = (RESULTS / "table.md").read_text(encoding="utf-8")
+    set_table(ROOT / "docs" / "results.md", tables)
+    set_table(ROOT / "README.md", "\n\n".join(tables.split("\n\n")[:2]) + "\n")
+
+
+def set_table(page: Path, text: str) -> None:
+    """Put a text between the marks of a page."""
+    before, rest = page.read_text(encoding="utf-8").split(BEGIN)
+    page.write_text(f"{before}{BEGIN}\n{text}{END}{rest.split(END)[1]}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What the documentation site needs beside its pages: formulas as pictures, and the command line's own help."""
+"""What the documentation site needs beside its pages: formulas as pictures, and what is made from the code."""
 
 import subprocess
 import sys
@@ -6,6 +6,7 @@ from html import escape
 from typing import Any
 
 import ziamath
+from references import fill
 
 COMMAND_LINE = "<!-- the command line's own help -->"
 
@@ -24,7 +25,8 @@ def on_config(config: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put the command line's help where a page asks for it."""
+    """Put the command line's help and the tables of `references` where a page asks for them."""
+    markdown = fill(markdown)
     if COMMAND_LINE not in markdown:
         return markdown
     command = [sys.executable, "-m", "typer", "multimodal_to.cli", "utils", "docs", "--name", "multimodal-to"]

@@ -11,7 +11,7 @@ import pytest
 import multimodal_to
 
 ROOT = Path(multimodal_to.__file__).parent
-ROOMS = ("files", "models", "trajectory", "scenarios", "exporting", "doctor", "ocp", "solving")
+ROOMS = ("files", "models", "trajectory", "scenarios", "exporting", "doctor", "ocp", "solving", "auditing")
 FILES = [file for room in ROOMS for file in sorted((ROOT / room).glob("*.py"))]
 
 

@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from multimodal_to import scenarios
+from multimodal_to.auditing import PROPERTIES, check_allowances
 from multimodal_to.auditing.audit import audit
+from multimodal_to.auditing.properties import judged
 from multimodal_to.errors import InputError
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.terrain import FlatGround, Plane, Stairs
+from multimodal_to.scenarios import Start, Terminal
 
 KNOT = 20
 
@@ -110,3 +113,58 @@ def test_the_figures_describe_the_motion(ironcub, take_off):
     assert report.airborne >= 0.5
     assert report.final_thrust_over_weight == pytest.approx(1.0, abs=0.01)
     assert np.isfinite([finding.worst for finding in report.findings]).all()
+
+
+def test_a_property_that_does_not_exist_is_refused_with_the_nearest_one(ironcub, take_off):
+    report = audit(ironcub, take_off.trajectory)
+    with pytest.raises(InputError, match=r"did you mean 'slip under load'\? Available: CoM consistency, "):
+        report["slip under lode"]
+
+
+CHANGES = {
+    "as it is": {},
+    "from a hover": {"start": Start.HOVER},
+    "to a stand": {"terminal": Terminal.STANDING},
+    "to a free end": {"terminal": Terminal.FREE},
+    "over the middle": {"mid_height_min": 0.6},
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_the_table_says_which_properties_are_judged_and_in_which_order(ironcub, take_off, change):
+    scenario = replace(scenarios.take_off(), **change)
+    found = [finding.name for finding in audit(ironcub, take_off.trajectory, scenario).findings]
+    assert found == judged(scenario, has_jets=True)
+
+
+def test_every_property_of_the_table_is_judged_for_some_task(ironcub, take_off):
+    seen = set()
+    for change in CHANGES.values():
+        seen |= set(judged(replace(scenarios.take_off(), **change), has_jets=True))
+    assert seen == set(PROPERTIES)
+    physics = [finding.name for finding in audit(ironcub, replace(take_off.trajectory, scenario_json="")).findings]
+    assert physics == judged(None, has_jets=True)
+    assert set(physics) - set(judged(None, has_jets=False)) == {
+        "thrust off CVODES, interval",
+        "thrust off CVODES, horizon",
+    }
+
+
+def test_an_allowance_widens_a_limit_and_never_narrows_it(ironcub, take_off):
+    scenario = replace(scenarios.take_off(), allowances={"slip under load": 0.5, "penetration": 1e-9})
+    report = audit(ironcub, take_off.trajectory, scenario)
+    assert report["slip under load"].limit == 0.5
+    assert report["penetration"].limit == PROPERTIES["penetration"].limit
+    assert report.allowances_used == ()
+
+
+@pytest.mark.parametrize("name", ["torque", "end: feet off the ground"], ids=["unknown", "of another end"])
+def test_an_allowance_that_the_audit_does_not_judge_is_refused_before_anything_is_solved(ironcub, take_off, name):
+    scenario = replace(scenarios.take_off(), allowances={name: 1.0})
+    for refuse in (
+        lambda: check_allowances(ironcub, scenario),
+        lambda: audit(ironcub, take_off.trajectory, scenario),
+    ):
+        with pytest.raises(InputError, match=f"unknown property to allow more of '{name}'"):
+            refuse()
+    check_allowances(ironcub, scenarios.jump())

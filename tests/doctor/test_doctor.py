@@ -142,6 +142,13 @@ HOPELESS = {
         "weights",
         "did you mean 'legs'",
     ),
+    "an allowance of a property that does not exist": (
+        same,
+        "take-off",
+        {"allowances": {"slip": 1.0}},
+        "allowances",
+        "unknown property to allow more of 'slip'",
+    ),
 }
 
 

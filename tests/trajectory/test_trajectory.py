@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from multimodal_to.errors import InputError, OutputError, TrajectoryError
-from multimodal_to.trajectory import QUANTITIES, Trajectory, labels, row_labels
+from multimodal_to.trajectory import ENTRIES, QUANTITIES, Trajectory, labels, row_labels
 from multimodal_to.trajectory.quantities import TWIST, XYZ
 from synthetic import take_off as synthetic_take_off
 
@@ -32,6 +32,7 @@ def test_the_file_holds_no_pickle_and_the_names_that_others_use(trajectory, tmp_
             archive.files
         )
         assert archive["contact_forces"].shape == (24, trajectory.knots + 1)
+        assert set(archive.files) == {*QUANTITIES, *ENTRIES}
 
 
 def test_files_of_earlier_versions_are_read_and_those_of_a_later_release_refused(trajectory, tmp_path):

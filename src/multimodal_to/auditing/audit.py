@@ -6,14 +6,15 @@ CoM and angular momentum from its mass-matrix side (J_CMM), not from the recursi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
 from multimodal_to.adam.spatial import Array
-from multimodal_to.auditing.findings import Finding, Motion, largest, worst_of
+from multimodal_to.auditing.findings import Finding, Motion, Worst, largest, worst_of
+from multimodal_to.auditing.properties import GAPS, PROPERTIES, check_allowances
 from multimodal_to.auditing.task import task_findings
 from multimodal_to.auditing.thrust import thrust_findings
 from multimodal_to.errors import InputError, unknown
@@ -25,9 +26,6 @@ from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import LOADED, flight_phases, generalised_forces, surface_frames
 from multimodal_to.trajectory.sameness import refuse_other_robot
-
-FRICTION_LIMIT = {FrictionCone.PYRAMID: 1e-3, FrictionCone.SECOND_ORDER: 1e-2}
-"""By how much a force may be outside its cone [N]; a row of squares is met less sharply where the forces vanish."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,8 +45,15 @@ class Audit:
         return all(finding.holds for finding in self.findings)
 
     def __getitem__(self, name: str) -> Finding:
-        """Return a finding by its property's name."""
-        return {finding.name: finding for finding in self.findings}[name]
+        """Return a finding by its property's name.
+
+        Raises:
+            InputError: the audit did not judge a property of that name.
+        """
+        by_name = {finding.name: finding for finding in self.findings}
+        if name not in by_name:
+            raise InputError(unknown("property of the audit", name, by_name))
+        return by_name[name]
 
 
 def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None) -> Audit:
@@ -61,13 +66,13 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
             keeps none, the ground is taken as flat at height zero, with the robot's own friction as a pyramid.
 
     Raises:
-        InputError: the trajectory is for another robot.
+        InputError: the trajectory is for another robot, or the scenario allows more of a property that is not judged.
     """
     refuse_other_robot(trajectory, robot)
     scenario = scenario or stored(trajectory)
     phases = flight_phases(trajectory)
     motion = Motion.of(robot, trajectory)
-    findings = (
+    worst = (
         *_kinematics(motion),
         *_dynamics(motion),
         *_torques(motion),
@@ -78,27 +83,56 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         *thrust_findings(robot, trajectory),
         *(task_findings(motion, scenario) if scenario else ()),
     )
-    allowed = _allow(findings, scenario.allowances) if scenario else findings
-    used = [own.name for own, wide in zip(findings, allowed, strict=True) if wide.holds and not own.holds]
+    findings = _findings(worst, robot, scenario)
     return Audit(
-        findings=allowed,
+        findings=findings,
         scenario=scenario,
         duration=trajectory.duration,
         airborne=max((end - start for start, end in phases), default=0.0),
         final_thrust_over_weight=float(motion.thrusts[:, -1, 2].sum() / robot.weight),
-        allowances_used=tuple(used),
+        allowances_used=tuple(entry.name for entry in findings if entry.holds and not _within(entry, robot, scenario)),
     )
 
 
-def _allow(findings: Sequence[Finding], allowances: Mapping[str, float]) -> tuple[Finding, ...]:
-    """Widen the limits of the properties that a scenario allows more."""
-    for name in allowances:
-        if name not in {finding.name for finding in findings}:
-            raise InputError(unknown("property to allow more of", name, [finding.name for finding in findings]))
-    return tuple(replace(finding, limit=max(finding.limit, allowances.get(finding.name, 0.0))) for finding in findings)
+def _findings(worst: Sequence[Worst], robot: Robot, scenario: Scenario | None) -> tuple[Finding, ...]:
+    """Return the worst values with their limits.
+
+    Args:
+        worst: one for each property, in order.
+        robot: that a limit may depend on.
+        scenario: whose allowances may widen a limit.
+
+    Raises:
+        InputError: the scenario allows more of a property that is not judged.
+    """
+    if scenario:
+        check_allowances(robot, scenario)
+    allowances = scenario.allowances if scenario else {}
+    return tuple(
+        Finding(
+            name=entry.name,
+            worst=entry.worst,
+            unit=PROPERTIES[entry.name].unit,
+            knot=entry.knot,
+            body=entry.body,
+            limit=max(PROPERTIES[entry.name].limit_for(robot, scenario), allowances.get(entry.name, 0.0)),
+        )
+        for entry in worst
+    )
 
 
-def _kinematics(motion: Motion) -> list[Finding]:
+def _within(finding: Finding, robot: Robot, scenario: Scenario | None) -> bool:
+    """Return whether a finding holds without an allowance.
+
+    Args:
+        finding: with the widened limit.
+        robot: that the own limit may depend on.
+        scenario: that the own limit may depend on.
+    """
+    return finding.worst <= PROPERTIES[finding.name].limit_for(robot, scenario)
+
+
+def _kinematics(motion: Motion) -> list[Worst]:
     robot, trajectory, count = motion.robot, motion.trajectory, motion.trajectory.time.size
     side_by_side = np.hstack(list(motion.base))
     com = np.array(robot.kindyn.CoM_position_fun().map(count)(side_by_side, trajectory.joint_positions))
@@ -113,14 +147,14 @@ def _kinematics(motion: Motion) -> list[Finding]:
     norms = np.linalg.norm(trajectory.base_quaternion_xyzw, axis=0)
     by_contact = np.abs(points - trajectory.contact_positions).reshape(len(robot.contacts), 3, count).max(axis=1)
     return [
-        worst_of("CoM consistency", "m", 1e-5, largest(com - trajectory.com_position)),
-        worst_of("momentum consistency", "kg m²/s", 1e-4, largest(momentum[3:] - trajectory.angular_momentum)),
-        worst_of("contact point consistency", "m", 1e-5, by_contact, robot.contact_names),
-        worst_of("quaternion norm", "1", 1e-6, np.abs(norms - 1)),
+        worst_of("CoM consistency", largest(com - trajectory.com_position)),
+        worst_of("momentum consistency", largest(momentum[3:] - trajectory.angular_momentum)),
+        worst_of("contact point consistency", by_contact, robot.contact_names),
+        worst_of("quaternion norm", np.abs(norms - 1)),
     ]
 
 
-def _dynamics(motion: Motion) -> list[Finding]:
+def _dynamics(motion: Motion) -> list[Worst]:
     """Newton and Euler for the whole robot, at every knot; both rates are zero at the first."""
     robot, trajectory = motion.robot, motion.trajectory
     acting = np.concatenate([motion.contact_forces, motion.thrusts])
@@ -128,12 +162,12 @@ def _dynamics(motion: Motion) -> list[Finding]:
     linear = acting.sum(axis=0) + robot.mass * robot.gravity - robot.mass * trajectory.com_acceleration.T
     moments = np.cross(points - trajectory.com_position.T, acting).sum(axis=0)
     return [
-        worst_of("force balance", "N", 1e-2, largest(linear.T)),
-        worst_of("moment balance", "N m", 1e-2, largest(moments.T - trajectory.angular_momentum_rate)),
+        worst_of("force balance", largest(linear.T)),
+        worst_of("moment balance", largest(moments.T - trajectory.angular_momentum_rate)),
     ]
 
 
-def _torques(motion: Motion) -> list[Finding]:
+def _torques(motion: Motion) -> list[Worst]:
     """RNEA along the motion under all contact forces and thrusts: joint torques, and what is left for the base.
 
     Accelerations are backward differences of the velocities, as the optimiser's backward Euler has them; placeholders
@@ -144,32 +178,23 @@ def _torques(motion: Motion) -> list[Finding]:
     effort = np.where(robot.joint_limits.effort < EFFORT_PLACEHOLDER, robot.joint_limits.effort, np.inf)
     beyond = np.abs(generalised[6:]) - effort[:, None]
     return [
-        worst_of("torque beyond effort", "N m", 1e-3, beyond, robot.joint_names),
-        worst_of("unexplained base force", "N", 0.01 * robot.weight, largest(generalised[:3])),
-        worst_of("unexplained base moment", "N m", 1.0, largest(generalised[3:6])),
+        worst_of("torque beyond effort", beyond, robot.joint_names),
+        worst_of("unexplained base force", largest(generalised[:3])),
+        worst_of("unexplained base moment", largest(generalised[3:6])),
     ]
 
 
-def _integration(motion: Motion) -> list[Finding]:
+def _integration(motion: Motion) -> list[Worst]:
     """Backward Euler: what a quantity gains over an interval is its rate at the end times Δt."""
     trajectory, steps = motion.trajectory, np.diff(motion.trajectory.time)
     findings = []
-    for name, rate, unit, limit in (
-        ("com_position", "com_velocity", "m", 1e-5),
-        ("com_velocity", "com_acceleration", "m/s", 1e-5),
-        ("angular_momentum", "angular_momentum_rate", "kg m²/s", 1e-5),
-        ("base_position", "base_linear_velocity", "m", 1e-5),
-        ("joint_positions", "joint_velocities", "rad", 1e-5),
-        ("contact_forces", "contact_force_rates", "N", 1e-3),
-        ("thrust", "thrust_rate", "N", 1e-3),
-        ("thrust_rate", "thrust_acceleration", "N/s", 1e-3),
-    ):
+    for name, rate, _, _ in GAPS:
         gaps = np.diff(getattr(trajectory, name), axis=1) - getattr(trajectory, rate)[:, 1:] * steps
-        findings.append(worst_of(f"gap of {name}", unit, limit, largest(gaps), first=1))
+        findings.append(worst_of(f"gap of {name}", largest(gaps), first=1))
     rotations = motion.base[:, :3, :3]
     turned = rotations[1:] @ rotations[:-1].transpose(0, 2, 1)
     gaps = turned - _rodrigues(trajectory.base_angular_velocity[:, 1:].T * steps[:, None])
-    findings.append(worst_of("gap of base orientation", "rad", 1e-5, np.abs(gaps).max(axis=(1, 2)), first=1))
+    findings.append(worst_of("gap of base orientation", np.abs(gaps).max(axis=(1, 2)), first=1))
     return findings
 
 
@@ -184,7 +209,7 @@ def _rodrigues(vectors: Array) -> Array:
     return np.asarray(np.eye(3) + first * skews + second * skews @ skews)
 
 
-def _jets(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+def _jets(robot: Robot, trajectory: Trajectory) -> list[Worst]:
     accelerations = np.array(
         [
             jet.model.acceleration(trajectory.thrust[row], trajectory.thrust_rate[row], trajectory.throttle[row])
@@ -192,10 +217,10 @@ def _jets(robot: Robot, trajectory: Trajectory) -> list[Finding]:
         ]
     ).reshape(len(robot.jets), trajectory.time.size)
     residuals = np.abs(accelerations - trajectory.thrust_acceleration)
-    return [worst_of("thrust dynamics", "N/s²", 1e-3, residuals, robot.jet_names)]
+    return [worst_of("thrust dynamics", residuals, robot.jet_names)]
 
 
-def _contacts(motion: Motion, scenario: Scenario | None) -> list[Finding]:
+def _contacts(motion: Motion, scenario: Scenario | None) -> list[Worst]:
     surface = scenario.surface if scenario else FlatGround()
     friction = (scenario.friction if scenario else None) or motion.robot.friction
     cone = scenario.friction_cone if scenario else FrictionCone.PYRAMID
@@ -208,15 +233,15 @@ def _contacts(motion: Motion, scenario: Scenario | None) -> list[Finding]:
     slips = np.linalg.norm(np.einsum("ckxt,ckx->ckt", tangents, moves), axis=2)
     names = motion.robot.contact_names
     return [
-        worst_of("penetration", "m", 1e-5, -heights, names),
-        worst_of("pulling normal force", "N", 1e-3, -normal, names),
-        worst_of("friction beyond cone", "N", FRICTION_LIMIT[cone], reached - friction * normal, names),
-        worst_of("normal force × height", "N m", 0.01, normal * heights, names),
-        worst_of("slip under load", "m", 1e-3, np.where(normal > LOADED, slips, 0.0), names),
+        worst_of("penetration", -heights, names),
+        worst_of("pulling normal force", -normal, names),
+        worst_of("friction beyond cone", reached - friction * normal, names),
+        worst_of("normal force × height", normal * heights, names),
+        worst_of("slip under load", np.where(normal > LOADED, slips, 0.0), names),
     ]
 
 
-def _limits(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+def _limits(robot: Robot, trajectory: Trajectory) -> list[Worst]:
     """How far quantities are beyond their limits; zero or less is within them."""
     limits, jets = robot.joint_limits, robot.jets
     joints, speeds = trajectory.joint_positions, np.abs(trajectory.joint_velocities)
@@ -226,8 +251,8 @@ def _limits(robot: Robot, trajectory: Trajectory) -> list[Finding]:
     highest = np.array([jet.throttle_max for jet in jets]).reshape(-1, 1)
     thrust, throttle = trajectory.thrust, trajectory.throttle
     return [
-        worst_of("joint range", "rad", 1e-6, beyond, robot.joint_names),
-        worst_of("joint speed", "rad/s", 1e-6, speeds - limits.speed[:, None], robot.joint_names),
-        worst_of("thrust range", "N", 1e-4, np.maximum(thrust - thrust_max, -thrust), robot.jet_names),
-        worst_of("throttle range", "%", 1e-4, np.maximum(throttle - highest, lowest - throttle), robot.jet_names),
+        worst_of("joint range", beyond, robot.joint_names),
+        worst_of("joint speed", speeds - limits.speed[:, None], robot.joint_names),
+        worst_of("thrust range", np.maximum(thrust - thrust_max, -thrust), robot.jet_names),
+        worst_of("throttle range", np.maximum(throttle - highest, lowest - throttle), robot.jet_names),
     ]

@@ -16,7 +16,7 @@ from multimodal_to.trajectory.derived import base_poses, contact_points, thrust_
 class Finding:
     """One property: its worst value on the horizon, where that is, and the limit it is held to."""
 
-    name: str
+    name: str  # of the property, as in `properties.PROPERTIES`
     worst: float
     unit: str
     knot: int
@@ -27,6 +27,16 @@ class Finding:
     def holds(self) -> bool:
         """Return whether the worst value is within the limit."""
         return self.worst <= self.limit
+
+
+@dataclass(frozen=True, kw_only=True)
+class Worst:
+    """The worst value of a property on the horizon, in the property's unit, and where it is."""
+
+    name: str  # of the property
+    worst: float
+    knot: int
+    body: str = ""  # joint, contact point, jet or axis; empty where there is only one
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,17 +69,24 @@ class Motion:
         return self.trajectory.per_contact("contact_forces").transpose(0, 2, 1)
 
 
-def worst_of(
-    name: str, unit: str, limit: float, values: Array, bodies: tuple[str, ...] = (), first: int = 0
-) -> Finding:
-    """Return the worst of values (bodies, knots from `first`), or (knots,)."""
+def worst_of(name: str, values: Array, bodies: tuple[str, ...] = (), first: int = 0) -> Worst:
+    """Return the worst of a property's values; without values it is zero.
+
+    Args:
+        name: of the property.
+        values: (bodies, knots) or (knots,), in the property's unit; the largest is the worst.
+        bodies: names of the rows; none where there is one row, or where no row has a name.
+        first: knot of the first column.
+    """
     table = np.atleast_2d(values)
     if not table.size:
-        return Finding(name=name, worst=0.0, unit=unit, knot=first, body="", limit=limit)
+        return Worst(name=name, worst=0.0, knot=first)
     row, column = np.unravel_index(int(np.argmax(table)), table.shape)
-    body = bodies[row] if bodies else ""
-    return Finding(
-        name=name, worst=float(table[row, column]), unit=unit, knot=int(column) + first, body=body, limit=limit
+    return Worst(
+        name=name,
+        worst=float(table[row, column]),
+        knot=int(column) + first,
+        body=bodies[row] if bodies else "",
     )
 
 

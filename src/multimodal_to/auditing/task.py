@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from multimodal_to.auditing.findings import Finding, Motion, worst_of
+from multimodal_to.adam.spatial import Array
+from multimodal_to.auditing.findings import Motion, Worst, worst_of
 from multimodal_to.models.terrain import frame_function
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 
 _SPEEDS = ("com_velocity", "base_linear_velocity", "base_angular_velocity", "joint_velocities")
 
 
-def task_findings(motion: Motion, scenario: Scenario) -> list[Finding]:
+def task_findings(motion: Motion, scenario: Scenario) -> list[Worst]:
     """Check a motion against its scenario."""
     return [*_start(motion, scenario), *_between(motion, scenario), *_end(motion, scenario)]
 
 
-def _start(motion: Motion, scenario: Scenario) -> list[Finding]:
+def _start(motion: Motion, scenario: Scenario) -> list[Worst]:
     findings = [_com("start: CoM", motion, 0, scenario.initial_com), *_rest("start", motion, 0)]
     if scenario.start is Start.STANDING:
         findings += [*_standing("start", motion, 0, scenario), _no_thrust(motion)]
@@ -25,7 +26,7 @@ def _start(motion: Motion, scenario: Scenario) -> list[Finding]:
     return [*findings, *_equilibrium("start", motion, 0)]
 
 
-def _end(motion: Motion, scenario: Scenario) -> list[Finding]:
+def _end(motion: Motion, scenario: Scenario) -> list[Worst]:
     last = motion.trajectory.knots
     findings = [_com("end: CoM", motion, last, scenario.final_com)]
     if scenario.terminal in (Terminal.HOVER, Terminal.STANDING):
@@ -37,82 +38,115 @@ def _end(motion: Motion, scenario: Scenario) -> list[Finding]:
     return findings
 
 
-def _between(motion: Motion, scenario: Scenario) -> list[Finding]:
+def _between(motion: Motion, scenario: Scenario) -> list[Worst]:
     """How far quantities are beyond the scenario's ranges; zero or less is within them."""
     trajectory, steps = motion.trajectory, np.diff(motion.trajectory.time)
     twists = np.abs(np.vstack([trajectory.base_linear_velocity, trajectory.base_angular_velocity]))
     away = np.abs(trajectory.com_position) - np.reshape(scenario.com_range, (3, 1))
     off_time = np.maximum(steps - scenario.interval_max, scenario.interval_min - steps)
     findings = [
-        Finding(
-            name="knots",
-            worst=abs(trajectory.knots - scenario.knots),
-            unit="1",
-            knot=trajectory.knots,
-            body="",
-            limit=0.0,
-        ),
-        worst_of("time step range", "s", 1e-6, off_time, first=1),
-        worst_of("base speed range", "m/s, rad/s", 1e-6, twists - scenario.base_speed_max),
-        worst_of("CoM range", "m", 1e-6, away, ("x", "y", "z")),
+        Worst(name="knots", worst=abs(trajectory.knots - scenario.knots), knot=trajectory.knots),
+        worst_of("time step range", off_time, first=1),
+        worst_of("base speed range", twists - scenario.base_speed_max),
+        worst_of("CoM range", away, ("x", "y", "z")),
     ]
     if scenario.mid_height_min is not None:
         middle = trajectory.knots // 2
         below = scenario.mid_height_min - float(trajectory.com_position[2, middle])
-        findings.append(Finding(name="middle: CoM below", worst=below, unit="m", knot=middle, body="", limit=1e-5))
+        findings.append(Worst(name="middle: CoM below", worst=below, knot=middle))
     return findings
 
 
-def _com(name: str, motion: Motion, knot: int, target: tuple[float, float, float]) -> Finding:
+def _com(name: str, motion: Motion, knot: int, target: tuple[float, float, float]) -> Worst:
+    """Return how far the CoM is from where it should be.
+
+    Args:
+        name: of the property.
+        motion: that is judged.
+        knot: at which.
+        target: position of the CoM in the world [m].
+    """
     off = np.abs(motion.trajectory.com_position[:, knot] - target)[:, None]
-    return worst_of(name, "m", 1e-5, off, ("x", "y", "z"), first=knot)
+    return worst_of(name, off, ("x", "y", "z"), first=knot)
 
 
-def _rest(when: str, motion: Motion, knot: int) -> list[Finding]:
-    """Nothing moves: not the CoM, the base or a joint, and there is no angular momentum."""
+def _rest(when: str, motion: Motion, knot: int) -> list[Worst]:
+    """Nothing moves: not the CoM, the base or a joint, and there is no angular momentum.
+
+    Args:
+        when: "start" or "end", with which the properties' names begin.
+        motion: that is judged.
+        knot: at which.
+    """
     trajectory = motion.trajectory
     speeds = np.concatenate([getattr(trajectory, name)[:, knot] for name in _SPEEDS])
     momentum = trajectory.angular_momentum[:, knot]
     return [
-        _at(f"{when}: speed", knot, "m/s, rad/s", 1e-5, np.abs(speeds)),
-        _at(f"{when}: angular momentum", knot, "kg m²/s", 1e-4, np.abs(momentum)),
+        _at(f"{when}: speed", knot, np.abs(speeds)),
+        _at(f"{when}: angular momentum", knot, np.abs(momentum)),
     ]
 
 
-def _standing(when: str, motion: Motion, knot: int, scenario: Scenario) -> list[Finding]:
-    """Every contact point is on the ground."""
+def _standing(when: str, motion: Motion, knot: int, scenario: Scenario) -> list[Worst]:
+    """Every contact point is on the ground.
+
+    Args:
+        when: "start" or "end", with which the property's name begins.
+        motion: that is judged.
+        knot: at which.
+        scenario: with the ground.
+    """
     points = motion.points[:, knot].T
     heights = np.array(frame_function(scenario.surface).map(points.shape[1])(points)[0])
-    return [worst_of(f"{when}: feet off the ground", "m", 2e-5, np.abs(heights).T, motion.robot.contact_names, knot)]
+    return [worst_of(f"{when}: feet off the ground", np.abs(heights).T, motion.robot.contact_names, knot)]
 
 
-def _hover(when: str, motion: Motion, knot: int) -> list[Finding]:
-    """No contact force, an upright base, and thrusts that carry the weight and hold still."""
+def _hover(when: str, motion: Motion, knot: int) -> list[Worst]:
+    """No contact force, an upright base, and thrusts that carry the weight and hold still.
+
+    Args:
+        when: "start" or "end", with which the properties' names begin.
+        motion: that is judged.
+        knot: at which.
+    """
     trajectory, weight = motion.trajectory, motion.robot.mass * motion.robot.gravity
     tilt = 2 * np.abs(trajectory.base_quaternion_xyzw[:3, knot])
     return [
-        _at(f"{when}: contact force", knot, "N", 0.011, np.abs(trajectory.contact_forces[:, knot])),
-        _at(f"{when}: base off upright", knot, "rad", 2.1e-3, tilt),
-        _at(f"{when}: thrust off weight", knot, "N", 0.1, np.abs(motion.thrusts[:, knot].sum(axis=0) + weight)),
-        _at(f"{when}: thrust rate", knot, "N/s", 1e-3, np.abs(trajectory.thrust_rate[:, knot])),
+        _at(f"{when}: contact force", knot, np.abs(trajectory.contact_forces[:, knot])),
+        _at(f"{when}: base off upright", knot, tilt),
+        _at(f"{when}: thrust off weight", knot, np.abs(motion.thrusts[:, knot].sum(axis=0) + weight)),
+        _at(f"{when}: thrust rate", knot, np.abs(trajectory.thrust_rate[:, knot])),
     ]
 
 
-def _no_thrust(motion: Motion) -> Finding:
-    return _at("start: thrust", 0, "N", 1e-4, np.abs(motion.trajectory.thrust[:, 0]))
+def _no_thrust(motion: Motion) -> Worst:
+    return _at("start: thrust", 0, np.abs(motion.trajectory.thrust[:, 0]))
 
 
-def _equilibrium(when: str, motion: Motion, knot: int) -> list[Finding]:
-    """Contact forces, thrusts and weight are in static equilibrium, whatever accelerations the file states."""
+def _equilibrium(when: str, motion: Motion, knot: int) -> list[Worst]:
+    """Contact forces, thrusts and weight are in static equilibrium, whatever accelerations the file states.
+
+    Args:
+        when: "start" or "end", with which the properties' names begin.
+        motion: that is judged.
+        knot: at which.
+    """
     robot, com = motion.robot, motion.trajectory.com_position[:, knot]
     forces = np.concatenate([motion.contact_forces[:, knot], motion.thrusts[:, knot]])
     points = np.concatenate([motion.points[:, knot], motion.thrust_points[:, knot]])
     moment = np.cross(points - com, forces).sum(axis=0)
     return [
-        _at(f"{when}: force balance", knot, "N", 1e-2, np.abs(forces.sum(axis=0) + robot.mass * robot.gravity)),
-        _at(f"{when}: moment balance", knot, "N m", 1e-2, np.abs(moment)),
+        _at(f"{when}: force balance", knot, np.abs(forces.sum(axis=0) + robot.mass * robot.gravity)),
+        _at(f"{when}: moment balance", knot, np.abs(moment)),
     ]
 
 
-def _at(name: str, knot: int, unit: str, limit: float, values: np.ndarray) -> Finding:
-    return Finding(name=name, worst=float(values.max(initial=0.0)), unit=unit, knot=knot, body="", limit=limit)
+def _at(name: str, knot: int, values: Array) -> Worst:
+    """Return the largest of a property's values at one knot.
+
+    Args:
+        name: of the property.
+        knot: at which.
+        values: of any shape, in the property's unit.
+    """
+    return Worst(name=name, worst=float(values.max(initial=0.0)), knot=knot)

@@ -6,18 +6,14 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.auditing.findings import Finding, worst_of
+from multimodal_to.auditing.findings import Worst, worst_of
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory
 
-INTERVAL_LIMIT = 10.0
-"""Largest difference that an interval of backward Euler may make to a thrust [N]; generous: a jet's greatest is 160."""
-HORIZON_LIMIT = 20.0
-"""Largest difference over the whole horizon [N]."""
 _TOLERANCE = 1e-8  # of the integrator, relative and absolute
 
 
-def thrust_findings(robot: Robot, trajectory: Trajectory) -> list[Finding]:
+def thrust_findings(robot: Robot, trajectory: Trajectory) -> list[Worst]:
     """Compare the thrusts with those that T̈ = f + g gives for the same throttles, integrated by CVODES.
 
     The throttle of an interval is that of its end, as backward Euler has it. Once every interval starts from the file's
@@ -37,13 +33,19 @@ def thrust_findings(robot: Robot, trajectory: Trajectory) -> list[Finding]:
         through[:, index] = state[:count] - trajectory.thrust[:, index + 1]
     names = robot.jet_names
     return [
-        worst_of("thrust off CVODES, interval", "N", INTERVAL_LIMIT, np.abs(alone), names, first=1),
-        worst_of("thrust off CVODES, horizon", "N", HORIZON_LIMIT, np.abs(through), names, first=1),
+        worst_of("thrust off CVODES, interval", np.abs(alone), names, first=1),
+        worst_of("thrust off CVODES, horizon", np.abs(through), names, first=1),
     ]
 
 
 def _advance(step: cs.Function, state: Array, parameters: Array) -> Array:
-    """Return the state after an interval; infinite where the model runs away, as it may with throttles beyond range."""
+    """Return the state after an interval; infinite where the model runs away, as it may with throttles beyond range.
+
+    Args:
+        step: from `_integrator`.
+        state: T [N] of all jets, then Ṫ [N/s] of all jets, (2 jets,).
+        parameters: the throttles [%], then Δt [s], (jets + 1,).
+    """
     if not np.isfinite(state).all():
         return state
     try:

@@ -15,7 +15,7 @@ TYPICAL_ITERATIONS: Mapping[str, int] = MappingProxyType(
 )
 """Iterations of the bundled scenarios in the run of `reproduce` that README's table shows."""
 
-_LATELY = 12  # iterations whose pace the guess goes by: those of the rough phase are faster
+_LATELY = 12  # iterations whose pace the guess goes by: those of the rough pass are faster
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Column, Table
 
-from multimodal_to.auditing.audit import Audit, audit
+from multimodal_to.auditing import Audit, audit, check_allowances
 from multimodal_to.cli import completion
 from multimodal_to.cli.common import (
     OptionalName,
@@ -42,7 +42,6 @@ from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.solving import Ipopt, Relaxation, Solution, relax
 from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
-from multimodal_to.solving.motion import motion
 from multimodal_to.trajectory import Trajectory
 
 _VIOLATIONS_SHOWN = 5
@@ -196,8 +195,7 @@ def solve(
     started = time.perf_counter()
     problem = build(the_robot, scenario)
     the_robot = problem.robot  # with the jets that the scenario uses
-    if scenario.allowances:
-        audit(the_robot, motion(problem, problem.guess), scenario)  # so that a wrong name ends here
+    check_allowances(the_robot, scenario)  # so that a wrong name ends before the solve
     console.print(
         f"{scenario.title}: {the_robot.name}, {scenario.knots} knots, {problem.lower.size} variables, "
         f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s"

@@ -12,7 +12,7 @@ from multimodal_to.doctor.reach import reach
 from multimodal_to.doctor.task import Task
 from multimodal_to.doctor.thrust import spool_up_time, weight
 from multimodal_to.doctor.travel import leap, push, speed
-from multimodal_to.doctor.weighing import costs, groups, scales
+from multimodal_to.doctor.weighing import allowances, costs, groups, scales
 from multimodal_to.errors import MultimodalError
 from multimodal_to.models.robot import Robot
 from multimodal_to.ocp.formulation import Formulation
@@ -22,6 +22,7 @@ Check = Callable[[Task], Iterator[Symptom]]
 
 CHECKS: tuple[Check, ...] = (
     groups,
+    allowances,
     costs,
     scales,
     weight,

@@ -1,4 +1,4 @@
-"""Whether weights name what exists, and costs and variables have sizes that the solver can tell apart."""
+"""Whether weights and allowances name what exists, and whether the sizes of costs and variables can be compared."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from multimodal_to.auditing import check_allowances
 from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
 from multimodal_to.doctor.task import Task
-from multimodal_to.errors import FormulationError, ModelError
+from multimodal_to.errors import FormulationError, InputError, ModelError
 from multimodal_to.solving.ipopt import Ipopt
 from multimodal_to.trajectory import QUANTITIES
 
@@ -38,6 +39,14 @@ def groups(task: Task) -> Iterator[Symptom]:
             f"weights.joint_velocities weighs {', '.join(twice)} by more than one group, and the last one counts alone",
             "name groups that do not overlap",
         )
+
+
+def allowances(task: Task) -> Iterator[Symptom]:
+    """Look up the properties of the audit that the scenario allows more of."""
+    try:
+        check_allowances(task.robot, task.scenario)
+    except InputError as cause:
+        yield error("allowances", str(cause), "name a property that the audit of this task judges")
 
 
 def costs(task: Task) -> Iterator[Symptom]:

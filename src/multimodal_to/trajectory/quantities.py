@@ -61,26 +61,30 @@ def _scalar(of: str, unit: str, meaning: str) -> Quantity:
 
 QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
     {
-        "com_position": _vector("robot", "m", "x, CoM in the world"),
-        "com_velocity": _vector("robot", "m/s", "ẋ"),
-        "com_acceleration": _vector("robot", "m/s²", "ẍ"),
-        "angular_momentum": _vector("robot", "kg m²/s", "hω, about the CoM, world axes"),
-        "angular_momentum_rate": _vector("robot", "N m", "ḣω"),
-        "base_position": _vector("robot", "m", "p, origin of the base in the world"),
+        "com_position": _vector("robot", "m", "x, position of the CoM"),
+        "com_velocity": _vector("robot", "m/s", "ẋ, velocity of the CoM"),
+        "com_acceleration": _vector("robot", "m/s²", "ẍ, acceleration of the CoM"),
+        "angular_momentum": _vector("robot", "kg m²/s", "hω, angular momentum about the CoM"),
+        "angular_momentum_rate": _vector("robot", "N m", "ḣω, rate of the angular momentum about the CoM"),
+        "base_position": _vector("robot", "m", "p, position of the base's origin"),
         "base_quaternion_xyzw": Quantity(
-            axes=XYZW, of="robot", unit="1", frame="world", meaning="ρ, world-from-base rotation, x y z w"
+            axes=XYZW,
+            of="robot",
+            unit="1",
+            frame="world",
+            meaning="ρ, orientation of the base: world-from-base rotation, x y z w",
         ),
-        "base_linear_velocity": _vector("robot", "m/s", "ṗ, world axes"),
-        "base_angular_velocity": _vector("robot", "rad/s", "ω, world axes"),
-        "joint_positions": _scalar("joint", "rad", "s"),
-        "joint_velocities": _scalar("joint", "rad/s", "ṡ"),
-        "contact_positions": _vector("contact", "m", "p_i, contact points in the world"),
-        "contact_forces": _vector("contact", "N", "f_i, on the robot, world axes"),
-        "contact_force_rates": _vector("contact", "N/s", "ḟ_i"),
-        "thrust": _scalar("jet", "N", "T"),
-        "thrust_rate": _scalar("jet", "N/s", "Ṫ"),
-        "thrust_acceleration": _scalar("jet", "N/s²", "T̈"),
-        "throttle": _scalar("jet", "%", "u"),
+        "base_linear_velocity": _vector("robot", "m/s", "ṗ, velocity of the base's origin"),
+        "base_angular_velocity": _vector("robot", "rad/s", "ω, angular velocity of the base"),
+        "joint_positions": _scalar("joint", "rad", "s, positions of the joints"),
+        "joint_velocities": _scalar("joint", "rad/s", "ṡ, velocities of the joints"),
+        "contact_positions": _vector("contact", "m", "p_i, positions of the contact points"),
+        "contact_forces": _vector("contact", "N", "f_i, force of the ground on the robot at each contact point"),
+        "contact_force_rates": _vector("contact", "N/s", "ḟ_i, rate of that force"),
+        "thrust": _scalar("jet", "N", "T, thrust along −z of the jet's frame"),
+        "thrust_rate": _scalar("jet", "N/s", "Ṫ, rate of the thrust"),
+        "thrust_acceleration": _scalar("jet", "N/s²", "T̈, second derivative of the thrust"),
+        "throttle": _scalar("jet", "%", "u, throttle"),
     }
 )
 """The arrays of a `Trajectory` by name; each is (rows × bodies, knots + 1)."""

@@ -14,10 +14,8 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import LONGEST, InputError, TrajectoryError, listed, shortened, unknown
 from multimodal_to.files.writing import whole
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing, text, texts
+from multimodal_to.trajectory.format import ENTRIES, FORMAT_VERSION, FORMATS
 from multimodal_to.trajectory.quantities import QUANTITIES, labels
-
-FORMAT_VERSION = 3
-"""Version 1 lacks `scenario_json`, versions 1 and 2 lack `solve_json`; they are read all the same."""
 
 PAPER_RULE = "backward Euler"
 """Name of the integration rule that the rates of a trajectory follow."""
@@ -196,10 +194,13 @@ class Trajectory:
         version = stored.get("format_version")
         if version is None or version.shape != () or version.dtype.kind not in "iu":
             raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it has no format_version")
-        if not 1 <= int(version) <= FORMAT_VERSION:
-            raise TrajectoryError(f"'{source}' has format version {version}; this release reads 1 to {FORMAT_VERSION}")
-        for name in ("scenario_json", "solve_json"):
-            stored.setdefault(name, np.array(""))
+        if int(version) not in FORMATS:
+            raise TrajectoryError(
+                f"'{source}' has format version {version}; this release reads {min(FORMATS)} to {FORMAT_VERSION}"
+            )
+        for name, entry in ENTRIES.items():
+            if entry.since > 1:  # older files lack it
+                stored.setdefault(name, np.array(""))
         refuse_missing(stored, ("robot", "scenario", "time", *_LABELS, *QUANTITIES), source)
         fields: dict[str, Any] = {name: numbers(stored, name, source) for name in ("time", *QUANTITIES)}
         fields |= {name: texts(stored, name, source) for name in _LABELS}

@@ -1,0 +1,408 @@
+"""What an audit judges: each property with its unit, its limit, where the limit comes from, and when it is judged.
+
+The findings take unit and limit from this table, and the reference page of the audit is made from it.
+
+Many limits follow from the solver. It counts a motion as feasible when no row is missed by more than 1e-5 of the row's
+scale (`solving.best.FEASIBLE`). That is 1e-5 m, rad, m/s or kg m²/s, and 5e-4 N or N/s for rows with a scale of 50.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from multimodal_to.auditing.property import Judged, Property
+from multimodal_to.errors import InputError, unknown
+from multimodal_to.models.robot import Robot
+from multimodal_to.scenarios.scenario import Scenario
+
+_FEASIBLE = "what a feasible motion may miss its row by"
+_BOUND = "a bound, which the solver holds; the limit is for rounding"
+
+_PHYSICS = (
+    Property(
+        name="CoM consistency",
+        unit="m",
+        limit=1e-5,
+        reason=_FEASIBLE,
+        meaning="difference of the stored CoM from that of the stored posture",
+    ),
+    Property(
+        name="momentum consistency",
+        unit="kg m²/s",
+        limit=1e-4,
+        reason="ten times what a feasible motion may miss its row by, since the CoM's own miss enters too",
+        meaning="difference of the stored angular momentum hω from J_CMM(q) ν",
+    ),
+    Property(
+        name="contact point consistency",
+        unit="m",
+        limit=1e-5,
+        reason=_FEASIBLE,
+        meaning="difference of a stored contact point from forward kinematics",
+    ),
+    Property(
+        name="quaternion norm",
+        unit="1",
+        limit=1e-6,
+        reason="integration by the exponential keeps the norm; the limit is for rounding and small misses that add up",
+        meaning="difference of |ρ| from one",
+    ),
+    Property(
+        name="force balance",
+        unit="N",
+        limit=1e-2,
+        reason="a feasible motion may miss its row by 1e-5 m/s, which over 0.05 s is 9e-3 N for a robot of 45 kg",
+        meaning="m g + Σ f − m ẍ, largest component: Newton for the whole robot",
+    ),
+    Property(
+        name="moment balance",
+        unit="N m",
+        limit=1e-2,
+        reason="chosen: the number of the force balance, for an arm of 1 m",
+        meaning="Σ (p − x) × f − ḣω, largest component: Euler for the whole robot",
+    ),
+    Property(
+        name="torque beyond effort",
+        unit="N m",
+        limit=1e-3,
+        reason="the URDF's effort limit; the rest is for rounding",
+        meaning="torque of a joint by inverse dynamics (RNEA) minus its effort limit; the problem has no row for it",
+    ),
+    Property(
+        name="unexplained base force",
+        unit="N",
+        limit=0.01,
+        of_weight=True,
+        reason="chosen: one hundredth of the robot's weight",
+        meaning="force that RNEA asks for at the base, where nothing pushes",
+    ),
+    Property(
+        name="unexplained base moment",
+        unit="N m",
+        limit=1.0,
+        reason="chosen: small beside the torque of one leg joint",
+        meaning="moment that RNEA asks for at the base, where nothing pushes",
+    ),
+)
+
+GAPS = (
+    ("com_position", "com_velocity", "m", 1e-5),
+    ("com_velocity", "com_acceleration", "m/s", 1e-5),
+    ("angular_momentum", "angular_momentum_rate", "kg m²/s", 1e-5),
+    ("base_position", "base_linear_velocity", "m", 1e-5),
+    ("joint_positions", "joint_velocities", "rad", 1e-5),
+    ("contact_forces", "contact_force_rates", "N", 1e-3),
+    ("thrust", "thrust_rate", "N", 1e-3),
+    ("thrust_rate", "thrust_acceleration", "N/s", 1e-3),
+)
+"""The quantities that backward Euler integrates: name, its rate, unit and limit of what is left."""
+_DIFFERENCES = ("com_acceleration", "angular_momentum_rate", "contact_force_rates", "thrust_acceleration")
+"""Rates that are no variables of the problem: the library's own files hold the difference itself."""
+
+
+def _gap_reason(rate: str, limit: float) -> str:
+    if rate in _DIFFERENCES:
+        return "this library's files hold the difference itself as the rate; the limit is for files from elsewhere"
+    return _FEASIBLE if limit == 1e-5 else "twice what a feasible motion may miss its row by"
+
+
+_INTEGRATION = (
+    *(
+        Property(
+            name=f"gap of {name}",
+            unit=unit,
+            limit=limit,
+            reason=_gap_reason(rate, limit),
+            meaning=f"gain of `{name}` over an interval minus `{rate}` at its end × Δt",
+        )
+        for name, rate, unit, limit in GAPS
+    ),
+    Property(
+        name="gap of base orientation",
+        unit="rad",
+        limit=1e-5,
+        reason=_FEASIBLE,
+        meaning="turn of the base over an interval against Exp(ω Δt), ω at the interval's end",
+    ),
+)
+
+_ACTUATION_AND_CONTACT = (
+    Property(
+        name="thrust dynamics",
+        unit="N/s²",
+        limit=1e-3,
+        reason="ten times what an answer misses its row by: 1e-7 of 50 N/s over 0.05 s is 1e-4 N/s²",
+        meaning="difference of the stored T̈ from what the turbine's model gives for T, Ṫ and u",
+    ),
+    Property(
+        name="penetration",
+        unit="m",
+        limit=1e-5,
+        reason=_FEASIBLE,
+        meaning="depth of a contact point below the ground",
+    ),
+    Property(
+        name="pulling normal force",
+        unit="N",
+        limit=1e-3,
+        reason="twice what a feasible motion may miss its row by",
+        meaning="contact force towards the ground's inside, −n·f",
+    ),
+    Property(
+        name="friction beyond cone",
+        unit="N",
+        limit=1e-3,
+        second_order_limit=1e-2,
+        reason="twice what a feasible motion may miss its row by; under the second-order cone more, because a row of "
+        "squares is met less sharply where forces vanish",
+        meaning="|t·f| − μ n·f under the scenario's cone and friction",
+    ),
+    Property(
+        name="normal force × height",
+        unit="N m",
+        limit=0.01,
+        reason="twice the default of `complementarity_max`",
+        meaning="normal force of a contact point × its height: force in the air",
+    ),
+    Property(
+        name="slip under load",
+        unit="m",
+        limit=1e-3,
+        reason="above what the default of `sliding_max` lets a point with 5 N slip: 0.4 mm along each tangent",
+        meaning="way of a contact point along the ground over an interval at whose end it carries more than 5 N",
+    ),
+    Property(
+        name="joint range",
+        unit="rad",
+        limit=1e-6,
+        reason=f"`lower` and `upper` in robot.toml: {_BOUND}",
+        meaning="how far a joint is outside its range",
+    ),
+    Property(
+        name="joint speed",
+        unit="rad/s",
+        limit=1e-6,
+        reason=f"`speed` in robot.toml: {_BOUND}",
+        meaning="how far a joint's speed is above its greatest",
+    ),
+    Property(
+        name="thrust range",
+        unit="N",
+        limit=1e-4,
+        reason=f"zero and `thrust_max` in robot.toml: {_BOUND}",
+        meaning="how far a thrust is outside its range",
+    ),
+    Property(
+        name="throttle range",
+        unit="%",
+        limit=1e-4,
+        reason=f"`throttle` in robot.toml: {_BOUND}",
+        meaning="how far a throttle is outside its range",
+    ),
+    Property(
+        name="thrust off CVODES, interval",
+        unit="N",
+        limit=10.0,
+        reason="chosen: a sixteenth of the smaller turbine's 160 N",
+        meaning="thrust at an interval's end minus that of an adaptive integrator started at the interval's start",
+        judged=Judged.WITH_JETS,
+    ),
+    Property(
+        name="thrust off CVODES, horizon",
+        unit="N",
+        limit=20.0,
+        reason="chosen: twice the limit of one interval",
+        meaning="thrust at a knot minus that of an adaptive integrator started at the first knot",
+        judged=Judged.WITH_JETS,
+    ),
+)
+
+
+def _com(when: str) -> Property:
+    return Property(
+        name=f"{when}: CoM",
+        unit="m",
+        limit=1e-5,
+        reason=_FEASIBLE,
+        meaning=f"distance of the CoM from `{'initial' if when == 'start' else 'final'}_com`, by axis",
+        judged=Judged.WITH_SCENARIO,
+    )
+
+
+def _rest(when: str, condition: Judged) -> tuple[Property, ...]:
+    return (
+        Property(
+            name=f"{when}: speed",
+            unit="m/s, rad/s",
+            limit=1e-5,
+            reason="zero is asked for; the limit is that of a feasible motion",
+            meaning="largest component of the velocities of CoM, base and joints",
+            judged=condition,
+        ),
+        Property(
+            name=f"{when}: angular momentum",
+            unit="kg m²/s",
+            limit=1e-4,
+            reason="zero is asked for; the limit is that of the momentum consistency",
+            meaning="largest component of hω",
+            judged=condition,
+        ),
+    )
+
+
+def _standing(when: str, condition: Judged) -> Property:
+    return Property(
+        name=f"{when}: feet off the ground",
+        unit="m",
+        limit=2e-5,
+        reason="the row lets a sole's corner be 1e-5 m high, and a feasible motion may miss it by as much",
+        meaning="distance of a contact point from the ground",
+        judged=condition,
+    )
+
+
+def _hovering(when: str, condition: Judged) -> tuple[Property, ...]:
+    return (
+        Property(
+            name=f"{when}: contact force",
+            unit="N",
+            limit=0.011,
+            reason="the problem leaves 0.01 N; a tenth of that for rounding",
+            meaning="largest component of a contact force",
+            judged=condition,
+        ),
+        Property(
+            name=f"{when}: base off upright",
+            unit="rad",
+            limit=2.1e-3,
+            reason="the problem leaves a quaternion's part 1e-3, which is 2e-3 rad; a twentieth of that for rounding",
+            meaning="twice the largest of the base quaternion's x, y and z",
+            judged=condition,
+        ),
+        Property(
+            name=f"{when}: thrust off weight",
+            unit="N",
+            limit=0.1,
+            reason="eight contact points may still carry 0.01 N each; the rest is for rounding",
+            meaning="sum of the thrusts plus m g, largest component",
+            judged=condition,
+        ),
+        Property(
+            name=f"{when}: thrust rate",
+            unit="N/s",
+            limit=1e-3,
+            reason="zero is asked for; the limit is twice that of a feasible motion",
+            meaning="largest Ṫ",
+            judged=condition,
+        ),
+    )
+
+
+def _equilibrium(when: str, condition: Judged) -> tuple[Property, ...]:
+    return (
+        Property(
+            name=f"{when}: force balance",
+            unit="N",
+            limit=1e-2,
+            reason="the limit of the force balance",
+            meaning="Σ f + m g, largest component, whatever accelerations the file states",
+            judged=condition,
+        ),
+        Property(
+            name=f"{when}: moment balance",
+            unit="N m",
+            limit=1e-2,
+            reason="the limit of the moment balance",
+            meaning="Σ (p − x) × f, largest component, whatever rates the file states",
+            judged=condition,
+        ),
+    )
+
+
+_TASK = (
+    _com("start"),
+    *_rest("start", Judged.WITH_SCENARIO),
+    _standing("start", Judged.STANDING_START),
+    Property(
+        name="start: thrust",
+        unit="N",
+        limit=1e-4,
+        reason=f"zero is asked for: {_BOUND}",
+        meaning="largest thrust",
+        judged=Judged.STANDING_START,
+    ),
+    *_hovering("start", Judged.HOVERING_START),
+    *_equilibrium("start", Judged.WITH_SCENARIO),
+    Property(
+        name="knots",
+        unit="1",
+        limit=0.0,
+        reason="`knots` of the scenario, exactly",
+        meaning="difference of the number of intervals from what is asked",
+        judged=Judged.WITH_SCENARIO,
+    ),
+    Property(
+        name="time step range",
+        unit="s",
+        limit=1e-6,
+        reason=f"`interval_min` and `interval_max` of the scenario: {_BOUND}",
+        meaning="how far a time step is outside its range",
+        judged=Judged.WITH_SCENARIO,
+    ),
+    Property(
+        name="base speed range",
+        unit="m/s, rad/s",
+        limit=1e-6,
+        reason=f"`base_speed_max` of the scenario: {_BOUND}",
+        meaning="how far a component of the base's twist is above its greatest",
+        judged=Judged.WITH_SCENARIO,
+    ),
+    Property(
+        name="CoM range",
+        unit="m",
+        limit=1e-6,
+        reason=f"`com_range` of the scenario: {_BOUND}",
+        meaning="how far the CoM is outside its range, by axis",
+        judged=Judged.WITH_SCENARIO,
+    ),
+    Property(
+        name="middle: CoM below",
+        unit="m",
+        limit=1e-5,
+        reason=_FEASIBLE,
+        meaning="how far the CoM at mid-horizon is below `mid_height_min`",
+        judged=Judged.WITH_MID_HEIGHT,
+    ),
+    _com("end"),
+    *_rest("end", Judged.END_AT_REST),
+    _standing("end", Judged.STANDING_END),
+    *_hovering("end", Judged.HOVERING_END),
+    *_equilibrium("end", Judged.HOVERING_END),
+)
+
+PROPERTIES: Mapping[str, Property] = MappingProxyType(
+    {entry.name: entry for entry in (*_PHYSICS, *_INTEGRATION, *_ACTUATION_AND_CONTACT, *_TASK)}
+)
+"""Every property by name, in the order of an audit's findings."""
+
+
+def judged(scenario: Scenario | None, has_jets: bool) -> list[str]:
+    """Return the names of the properties that a motion is judged by, in the order of the table."""
+    return [name for name, entry in PROPERTIES.items() if entry.judged.applies(scenario, has_jets)]
+
+
+def check_allowances(robot: Robot, scenario: Scenario) -> None:
+    """Refuse a scenario that allows more of a property which its audit does not judge.
+
+    Args:
+        robot: with the jets that the scenario uses.
+        scenario: whose allowances are looked at.
+
+    Raises:
+        InputError: no property of the audit has the name of an allowance.
+    """
+    known = judged(scenario, has_jets=bool(robot.jets))
+    for name in scenario.allowances:
+        if name not in known:
+            raise InputError(unknown("property to allow more of", name, known))

@@ -1,0 +1,60 @@
+"""`Property`: one thing that an audit judges, with its unit, its limit, and when it is judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from multimodal_to.models.contact import FrictionCone
+from multimodal_to.models.robot import Robot
+from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
+
+
+class Judged(Enum):
+    """When a property is judged; the value says it in words."""
+
+    ALWAYS = "always"
+    WITH_JETS = "the motion has jets"
+    WITH_SCENARIO = "the scenario is known"
+    WITH_MID_HEIGHT = "the scenario has a `mid_height_min`"
+    STANDING_START = "the scenario starts standing"
+    HOVERING_START = "the scenario starts in a hover"
+    END_AT_REST = "the scenario ends standing or in a hover"
+    STANDING_END = "the scenario ends standing"
+    HOVERING_END = "the scenario ends in a hover"
+
+    def applies(self, scenario: Scenario | None, has_jets: bool) -> bool:
+        """Return whether a motion is judged; without a scenario only its physics is."""
+        if self in (Judged.ALWAYS, Judged.WITH_JETS) or scenario is None:
+            return self is Judged.ALWAYS or (self is Judged.WITH_JETS and has_jets)
+        return {
+            Judged.WITH_SCENARIO: True,
+            Judged.WITH_MID_HEIGHT: scenario.mid_height_min is not None,
+            Judged.STANDING_START: scenario.start is Start.STANDING,
+            Judged.HOVERING_START: scenario.start is Start.HOVER,
+            Judged.END_AT_REST: scenario.terminal in (Terminal.STANDING, Terminal.HOVER),
+            Judged.STANDING_END: scenario.terminal is Terminal.STANDING,
+            Judged.HOVERING_END: scenario.terminal is Terminal.HOVER,
+        }[self]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Property:
+    """One thing that an audit judges."""
+
+    name: str
+    unit: str
+    limit: float  # largest value that holds, in `unit`; a share of m |g| where `of_weight`
+    reason: str  # where the limit comes from
+    meaning: str  # what is compared with the limit
+    judged: Judged = Judged.ALWAYS
+    of_weight: bool = False
+    second_order_limit: float | None = None  # the limit under the second-order friction cone, where it is another one
+
+    def limit_for(self, robot: Robot, scenario: Scenario | None) -> float:
+        """Return the limit in `unit` for a robot and, where it is known, its scenario."""
+        if self.of_weight:
+            return self.limit * robot.weight
+        if self.second_order_limit is not None and scenario and scenario.friction_cone is FrictionCone.SECOND_ORDER:
+            return self.second_order_limit
+        return self.limit
