@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import pickle
 import runpy
 from collections.abc import Callable
@@ -31,10 +32,10 @@ def ironcub() -> mt.Robot:
 
 
 @pytest.fixture(scope="session")
-def once(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Callable[..., Any]:
+def once(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
     """Make a thing once a session, whichever of the processes that run the tests needs it first; others wait for it."""
     base = tmp_path_factory.getbasetemp()
-    folder = base.parent if hasattr(request.config, "workerinput") else base
+    folder = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
     def made(name: str, make: Callable[[], Any]) -> Any:
         file = folder / f"{name}.pickle"
