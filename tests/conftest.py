@@ -19,7 +19,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 SHORT = {
     "take_off": (35, 0.2, 0.2),
     "landing": (35, 0.2, 0.2),
-    "take_off_and_landing": (100, 0.1, 0.2),
+    "take_off_and_landing": (80, 0.1, 0.2),
     "walk_to_fly": (50, 0.2, 0.2),
     "step_up": (28, 0.25, 0.25),
 }
