@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import pickle
 import runpy
 from collections.abc import Callable
@@ -18,7 +19,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 SHORT = {
     "take_off": (35, 0.2, 0.2),
     "landing": (35, 0.2, 0.2),
-    "take_off_and_landing": (100, 0.1, 0.2),
+    "take_off_and_landing": (80, 0.1, 0.2),
     "walk_to_fly": (50, 0.2, 0.2),
     "step_up": (28, 0.25, 0.25),
 }
@@ -31,10 +32,10 @@ def ironcub() -> mt.Robot:
 
 
 @pytest.fixture(scope="session")
-def once(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Callable[..., Any]:
+def once(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
     """Make a thing once a session, whichever of the processes that run the tests needs it first; others wait for it."""
     base = tmp_path_factory.getbasetemp()
-    folder = base.parent if hasattr(request.config, "workerinput") else base
+    folder = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
     def made(name: str, make: Callable[[], Any]) -> Any:
         file = folder / f"{name}.pickle"

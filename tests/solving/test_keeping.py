@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -82,7 +83,11 @@ def test_a_solve_cut_short_ends_with_the_best_of_all_its_iterates(problem, shown
 
 
 def test_a_time_limit_ends_with_an_iterate_and_its_status(problem):
-    cut = mt.solve(problem, mt.Ipopt(time_limit=0.1))
+    def wait(iterate):  # the quaternions of the first iterates are not of length one, as those of a trajectory are
+        if iterate.iteration == 14:
+            time.sleep(2.0)
+
+    cut = mt.solve(problem, mt.Ipopt(time_limit=2.0), wait)
     assert cut.status is mt.Status.TIME_LIMIT
     assert cut.solve_time < 5.0
     assert cut.objective == pytest.approx(sum(problem.costs(variables(problem, cut.trajectory)).values()), rel=1e-6)
