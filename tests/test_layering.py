@@ -78,7 +78,7 @@ def test_every_room_is_on_a_floor():
 
 def test_only_the_problem_makes_an_opti():
     users = {str(file.relative_to(ROOT)) for file in FILES if "Opti(" in file.read_text(encoding="utf-8")}
-    assert users == {"ocp/problem.py"}
+    assert users == {"ocp/building.py"}
 
 
 def test_nothing_prints_below_the_command_line():

@@ -12,6 +12,7 @@ import multimodal_to as mt
 from multimodal_to.cli import app
 from multimodal_to.errors import OutputError, SolverError
 from multimodal_to.ocp import compiled
+from multimodal_to.ocp.outline import formulate, prepared
 
 needs_compiler = pytest.mark.skipif(compiled._compiler() is None, reason="there is no C compiler")
 
@@ -131,3 +132,26 @@ def test_the_command_says_where_they_are_kept(files, empty_cache):
     assert ended.exit_code == 0
     assert f"jump: {len(files)} functions compiled in" in ended.output
     assert f"kept in {empty_cache}" in ended.output
+
+
+@needs_compiler
+def test_derivatives_of_own_terms_are_compiled_too(ironcub, hop, files, monkeypatch):
+    """A cost of one's own is part of the functions: they are other ones, and found when they have been compiled."""
+
+    def slow_turns(knot, parameters):
+        return knot.base_angular_velocity
+
+    own = mt.Formulation.paper().with_terms(mt.Cost(residual=slow_turns, weight=1e2, unit="rad/s"))
+    assert not set(map(str, _costly(ironcub, hop, own))) & set(map(str, files))
+    monkeypatch.setattr(compiled, "_FLAGS", ("-O0", "-shared", "-fPIC"))
+    assert not mt.build(ironcub, hop, own).nlp.compiled
+    mt.precompile(ironcub, hop, own)
+    assert mt.build(ironcub, hop, own).nlp.compiled
+
+
+def _costly(robot, scenario, formulation):
+    """The files in which the functions that see the costs' curvature would be kept."""
+    robot, standing = prepared(robot, scenario)
+    stages = formulate(robot, scenario, standing, formulation).stages
+    every = next(named.stage for named in stages if named.stage.repeats > 1)
+    return [compiled._path(every.hessian()[0])]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.task import Task
 from multimodal_to.errors import FormulationError, MultimodalError, listed
-from multimodal_to.ocp.problem import Outline, formulate
+from multimodal_to.ocp.outline import Outline, formulate
 from multimodal_to.ocp.stages import NamedStage
 from multimodal_to.ocp.variables import Bounds, Layout
 from multimodal_to.trajectory import QUANTITIES, labels

@@ -1,10 +1,11 @@
 """What is asked: variables, terms, the integration rule, and the problem that they make."""
 
+from multimodal_to.ocp.building import build, precompile
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.integration import BackwardEuler, IntegrationRule, Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
-from multimodal_to.ocp.problem import Problem, build, precompile
+from multimodal_to.ocp.problem import Problem
 from multimodal_to.ocp.terms import Constraint, Cost, Where, Within, at_least, at_most, between, equal
 from multimodal_to.ocp.variables import Variable
 

@@ -1,0 +1,196 @@
+"""`build`: a robot, a scenario and a formulation become a `Problem`; `precompile` compiles its derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import casadi as cs
+import numpy as np
+
+from multimodal_to.adam.spatial import Array
+from multimodal_to.errors import FormulationError, listed
+from multimodal_to.models.robot import Robot
+from multimodal_to.ocp import compiled
+from multimodal_to.ocp.formulation import Formulation
+from multimodal_to.ocp.guess import start_guess
+from multimodal_to.ocp.outline import formulate, prepared
+from multimodal_to.ocp.problem import BoundSet, Problem, RowSet
+from multimodal_to.ocp.stages import Held, NamedStage
+from multimodal_to.ocp.transcription import Nlp, assemble
+from multimodal_to.ocp.variables import Layout
+from multimodal_to.scenarios.scenario import Scenario
+
+
+def build(robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> Problem:
+    """Return the problem of a scenario for a robot; nothing is solved but the start posture.
+
+    Args:
+        robot: whose motion it is.
+        scenario: the task.
+        formulation: what the problem is made of; by default `Formulation.paper()`.
+
+    Raises:
+        ScenarioError: the scenario contradicts itself or does not fit the robot.
+        FormulationError: a term does not return what it has to, or is not a number at the start guess.
+    """
+    formulation = formulation or Formulation.paper()
+    robot, standing = prepared(robot, scenario)
+    outline = formulate(robot, scenario, standing, formulation)
+    layout = outline.layout
+    nlp = assemble([named.stage for named in outline.stages], layout.size, scenario.knots)
+
+    scale = np.append(np.tile(layout.scale, scenario.knots + 1), formulation.interval_scale)
+    lower, upper, box_lower, box_upper = (
+        np.append(np.concatenate([side[name] for name in layout.rows]).ravel(order="F"), limit) / scale
+        for bounds in (outline.bounds, outline.box)
+        for side, limit in ((bounds.lower, scenario.interval_min), (bounds.upper, scenario.interval_max))
+    )
+    row_lower, row_upper, rows = _row_bounds(outline.stages)
+    middle = 0.5 * (scenario.interval_min + scenario.interval_max)
+    guess = np.append(start_guess(robot, scenario, standing, layout).ravel(order="F"), middle) / scale
+    problem = Problem(
+        robot=robot,
+        scenario=scenario,
+        formulation=formulation,
+        layout=layout,
+        opti=_opti(nlp, lower, upper, row_lower, row_upper),
+        nlp=nlp,
+        lower=lower,
+        upper=upper,
+        box_lower=box_lower,
+        box_upper=box_upper,
+        row_lower=row_lower,
+        row_upper=row_upper,
+        rows=rows,
+        bound_rows=_bound_sets(outline.held, layout),
+        cost_names=tuple(name for named in outline.stages for name in named.cost_names),
+        guess=np.clip(guess, lower, upper),
+        scale=scale,
+    )
+    _refuse_no_numbers(problem, outline.stages)
+    return problem
+
+
+def precompile(robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> tuple[Path, ...]:
+    """Compile the derivatives of a scenario's problem, for every later `build` of one like it; return their files.
+
+    Takes a C compiler some ten seconds; an iteration of the solver then takes a seventh less. Alike are problems with
+    the same robot, ground, weights and terms, whatever their targets and numbers of knots.
+
+    Args:
+        robot: whose motion it is.
+        scenario: the task.
+        formulation: what the problem is made of; by default `Formulation.paper()`.
+
+    Raises:
+        ScenarioError: the scenario contradicts itself or does not fit the robot.
+        FormulationError: a term does not return what it has to.
+        SolverError: there is no C compiler, or it refuses.
+        OutputError: the folder of compiled derivatives cannot be written to.
+    """
+    robot, standing = prepared(robot, scenario)
+    outline = formulate(robot, scenario, standing, formulation or Formulation.paper())
+    repeated = [named.stage for named in outline.stages if named.stage.repeats > 1]
+    return compiled.compile_functions(function for stage in repeated for function in stage.derivatives())
+
+
+def _row_bounds(stages: Sequence[NamedStage]) -> tuple[Array, Array, dict[str, RowSet]]:
+    """Return the bounds of g in solver units, and where each name's rows are."""
+    low, high, sets, first = list[Array](), list[Array](), dict[str, RowSet](), 0
+    for named in stages:
+        height, repeats = named.stage.rows.shape[0], named.stage.repeats
+        lower, upper, offset = np.zeros(height), np.zeros(height), 0
+        for name, rows in named.rows:
+            count = rows.expression.shape[0]
+            here = slice(offset, offset + count)
+            lower[here], upper[here] = rows.lower / rows.scale, rows.upper / rows.scale
+            here_too = RowSet(
+                index=(first + np.arange(offset, offset + count)[:, None] + height * np.arange(repeats)).ravel(),
+                knots=np.tile(named.knots, count),
+                components=np.repeat(np.array(rows.components, dtype=np.str_), repeats),
+                units=np.repeat(np.array(rows.units, dtype=np.str_), repeats),
+                scale=np.full(count * repeats, rows.scale),
+            )
+            sets[name] = sets[name].joined(here_too) if name in sets else here_too
+            offset += count
+        low.append(np.tile(lower, repeats))
+        high.append(np.tile(upper, repeats))
+        first += height * repeats
+    return np.concatenate(low), np.concatenate(high), sets
+
+
+def _bound_sets(held: Sequence[Held], layout: Layout) -> dict[str, BoundSet]:
+    """Return where each name's rows are among the bounds of x."""
+    sets = {}
+    for name in dict.fromkeys(some.term for some in held):
+        mine = [some for some in held if some.term == name]
+        counts = [some.knots.size for some in mine]
+        sets[name] = BoundSet(
+            index=np.concatenate(
+                [layout.rows[some.variable].start + some.row + layout.size * some.knots for some in mine]
+            ),
+            knots=np.concatenate([some.knots for some in mine]),
+            components=np.repeat(np.array([some.component for some in mine], dtype=np.str_), counts),
+            units=np.repeat(np.array([some.unit for some in mine], dtype=np.str_), counts),
+            scale=np.repeat([some.slope for some in mine], counts),
+            lower=np.repeat([some.lower for some in mine], counts),
+            upper=np.repeat([some.upper for some in mine], counts),
+        )
+    return sets
+
+
+def _refuse_no_numbers(problem: Problem, stages: Sequence[NamedStage]) -> None:
+    """Make sure that every term and its derivatives are numbers at the start guess.
+
+    Raises:
+        FormulationError: one is not.
+    """
+    guess, empty = problem.guess, np.zeros(0)
+    values, jacobian = problem.nlp.jacobian(guess, empty)
+    slopes = np.zeros(problem.row_lower.size)
+    np.add.at(slopes, np.array(jacobian.sparsity().get_triplet()[0], dtype=np.int64), np.array(jacobian.nonzeros()))
+    for what, numbers in (("value", np.array(values).ravel()), ("derivative", slopes)):
+        for name, rows in problem.rows.items():
+            if (bad := np.flatnonzero(~np.isfinite(numbers[rows.index]))).size:
+                where = f"knot {rows.knots[bad[0]]}" + " ".join(("", str(rows.components[bad[0]]))).rstrip()
+                raise FormulationError(
+                    f"the term '{name}': its {what} at the start guess is no finite number, at {where}; expected a "
+                    "function that is smooth there"
+                )
+    for name, value in problem.costs(guess).items():
+        if not np.isfinite(value):
+            raise FormulationError(
+                f"the term '{name}': its value at the start guess is no finite number; expected a function that is "
+                "smooth there"
+            )
+    if not np.isfinite(np.array(problem.nlp.gradient(guess, empty)[1])).all():
+        names = [name for named in stages for name in _steep_costs(problem, named)]
+        raise FormulationError(
+            f"the term '{listed(names)}': its derivative at the start guess is no finite number; expected a function "
+            "that is smooth there"
+        )
+
+
+def _steep_costs(problem: Problem, named: NamedStage) -> list[str]:
+    """Return the costs of a stage that have no finite gradient at the start guess."""
+    stage, x = named.stage, problem.guess
+    columns = x[stage.positions(problem.layout.size, x.size - 1)]
+    size = problem.layout.size
+    steep = []
+    for index, name in enumerate(named.cost_names):
+        function = stage.cost_gradient(index).map(stage.repeats)
+        gradient = function(columns[:size], columns[size : 2 * size], columns[2 * size :])
+        if not np.isfinite(np.array(gradient)).all():
+            steep.append(name)
+    return steep
+
+
+def _opti(nlp: Nlp, lower: Array, upper: Array, row_lower: Array, row_upper: Array) -> cs.Opti:
+    """Return the `Opti` problem; bounds come first, so that they can be told from the rows."""
+    opti = cs.Opti()
+    x = opti.variable(lower.size)
+    opti.subject_to(opti.bounded(lower, x, upper))
+    opti.subject_to(opti.bounded(row_lower, nlp.rows(x), row_upper))
+    opti.minimize(nlp.objective(x))
+    return opti

@@ -1,0 +1,88 @@
+"""The outline of a problem: variables with their bounds, and rows and costs by stage, before anything is derived."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from multimodal_to.errors import FormulationError, ScenarioError, listed
+from multimodal_to.models.robot import Posture, Robot
+from multimodal_to.ocp.boundary import set_boundary
+from multimodal_to.ocp.formulation import Formulation
+from multimodal_to.ocp.guess import standing_posture
+from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.ocp.stages import Held, NamedStage, collect
+from multimodal_to.ocp.variables import Bounds, Layout, ranges
+from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outline:
+    """A problem before anything is derived: variables with their bounds, and rows and costs by stage."""
+
+    layout: Layout
+    bounds: Bounds
+    box: Bounds  # without the terms that are bounds
+    stages: list[NamedStage]
+    held: list[Held]  # the rows that are bounds
+
+    def terms_that_hold(self, variable: str, row: int, knot: int) -> tuple[str, ...]:
+        """Return the names of the terms that are bounds of one row of a variable at a knot.
+
+        Args:
+            variable: name of the variable.
+            row: which of its rows.
+            knot: which knot.
+        """
+        return tuple(
+            some.term for some in self.held if (some.variable, some.row) == (variable, row) and knot in some.knots
+        )
+
+
+def formulate(robot: Robot, scenario: Scenario, standing: Posture, formulation: Formulation) -> Outline:
+    """Return the outline of a problem.
+
+    Args:
+        robot: with the jets that the scenario uses.
+        scenario: the task.
+        standing: posture in which the motion starts or, if it starts in the air, that it is pulled to.
+        formulation: what the problem is made of.
+
+    Raises:
+        ScenarioError: what the start or the end holds is outside its range.
+        FormulationError: a term does not return what it has to, or contradicts the start or the end.
+    """
+    layout = Layout.of(robot, formulation.variables)
+    box = ranges(robot, scenario, layout)
+    bounds = box.copy()
+    stages, held = collect(formulation, Parameters.of(robot, scenario, standing), layout, bounds)
+    set_boundary(box, robot, scenario, standing)
+    try:
+        set_boundary(bounds, robot, scenario, standing)
+    except ScenarioError as error:  # without the terms it fits, as the line before has shown
+        terms = dict.fromkeys(some.term for some in held if str(error).startswith(f"{some.variable}[{some.row}]"))
+        raise FormulationError(f"the term '{listed(terms)}' contradicts the start or the end: {error}") from error
+    return Outline(layout=layout, bounds=bounds, box=box, stages=stages, held=held)
+
+
+def prepared(robot: Robot, scenario: Scenario) -> tuple[Robot, Posture]:
+    """Return the robot with the jets that a scenario uses, and the posture in which it stands.
+
+    Raises:
+        ScenarioError: the scenario does not fit the robot.
+    """
+    if not scenario.jets:
+        robot = robot.with_jets(())
+    if not robot.contacts:
+        raise ScenarioError(f"{robot.name} has no contact points to stand on")
+    for group in scenario.weights.joint_velocities:
+        robot.group_indices(group)
+    return robot, _standing(robot, scenario)
+
+
+def _standing(robot: Robot, scenario: Scenario) -> Posture:
+    """Return the posture in which the robot stands where the motion starts or, if in the air, where it ends."""
+    if scenario.start is Start.STANDING:
+        return standing_posture(robot, scenario.surface, scenario.initial_com)
+    if scenario.terminal is Terminal.STANDING:
+        return standing_posture(robot, scenario.surface, scenario.final_com)
+    return robot.home
