@@ -26,7 +26,7 @@ from multimodal_to.replay.meshes import LARGEST_MESH
 from multimodal_to.scenarios import SCENARIOS
 from multimodal_to.scenarios.keys import scenario_keys
 from multimodal_to.scenarios.scenario import MOST_KNOTS
-from multimodal_to.trajectory import ENTRIES, FORMATS, QUANTITIES, archive
+from multimodal_to.trajectory import ENTRIES, FORMATS, QUANTITIES, archive, rules
 
 MARK = re.compile(r"<!-- from the code: ([a-z ]+) -->")
 _COUNTS = {"robot": "", "joint": "joints", "contact": "contacts", "jet": "jets"}
@@ -53,18 +53,22 @@ def table(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def quantities() -> str:
     """Return the quantities of a trajectory."""
     return table(
-        ("name", "shape", "unit", "axes of", "meaning"),
+        ("name", "shape", "unit", "axes of", "staggered: where in the interval", "meaning"),
         [
             (
                 f"`{name}`",
                 _shape(quantity.rows, _COUNTS[quantity.of]),
                 quantity.unit,
                 quantity.frame or "–",
+                _INSTANTS[rules.instant(rules.STAGGERED, name)],
                 quantity.meaning,
             )
             for name, quantity in QUANTITIES.items()
         ],
     )
+
+
+_INSTANTS = {0.0: "end", 0.5: "middle", 1.0: "start"}
 
 
 def _shape(rows: int, bodies: str) -> str:
@@ -181,6 +185,7 @@ def keys(every: Iterable[Key]) -> str:
 def terms() -> str:
     """Return the terms of the paper's formulation: constraints and costs, each with its formula."""
     formulation = Formulation.paper()
+    staggered = [term for term in Formulation.staggered().constraints if term not in formulation.terms]
     robot = load_robot("ironcub")
     tasks = {
         name: Parameters.of(robot, make(), robot.home) for name, make in SCENARIOS.items()
@@ -189,9 +194,10 @@ def terms() -> str:
         ("constraint", "formula", "set", "unit", "where"),
         [
             (f"`{term.name}`", _formula(term), _set(term, tasks["take-off"]), _units(term), _places(term, tasks))
-            for term in formulation.constraints
+            for term in (*formulation.constraints, *staggered)
         ],
     )
+    names = ", ".join(f"`{term.name}`" for term in staggered)
     costs = table(
         ("cost", "residual", "unit", "charged", "how"),
         [
@@ -206,9 +212,9 @@ def terms() -> str:
         ],
     )
     return (
-        f"## Constraints\n\n{constraints}\n\n## Costs\n\nA cost adds weight × |residual|² to the objective. If it is "
-        "charged per second, it is multiplied by Δt. The weight is the key of the same name in `weights` of the "
-        f"scenario.\n\n{costs}"
+        f"## Constraints\n\n{constraints}\n\nOnly the staggered rule has {names}.\n\n## Costs\n\n"
+        "A cost adds weight × |residual|² to the objective. If it is charged per second, it is multiplied by Δt. The "
+        f"weight is the key of the same name in `weights` of the scenario.\n\n{costs}"
     )
 
 

@@ -412,3 +412,17 @@ def test_audit_and_show_name_the_terms_that_they_do_not_have(with_own_terms):
     assert f"the problem had {OWN_TERMS}; the audit does not judge these" in run("audit", with_own_terms).stdout
     assert json.loads(run("audit", with_own_terms, "--json").stdout)["formulation"] == OWN_TERMS
     assert run("show", with_own_terms).stdout.startswith(f"# the problem had {OWN_TERMS}; a scenario does not hold")
+
+
+def test_a_staggered_solve_says_its_rule_and_is_gone_on_from_by_it(tmp_path):
+    short = ("--set", "knots=20", "--set", "interval_min=0.35", "--set", "interval_max=0.35", "--no-pictures")
+    first = run("solve", "landing", *short, "--staggered", "--max-iterations", 5, "--output", tmp_path)
+    assert first.returncode == 1
+    file = tmp_path / "trajectory.npz"
+    assert Trajectory.load(file).rule == "staggered"
+    assert run("solve", "--resume", file, "--max-iterations", 3, "--no-pictures").returncode == 1
+    assert Trajectory.load(file).rule == "staggered"
+    plain = replace(Trajectory.load(file), rule="backward Euler").save(tmp_path / "plain.npz")
+    refused = run("solve", "--resume", plain, "--staggered")
+    assert refused.returncode == 2
+    assert "--resume goes on with its own rule; --warm-start starts a staggered solve from it" in refused.stderr

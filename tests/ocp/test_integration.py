@@ -1,11 +1,24 @@
+"""Integration rules: their gaps close where they should, and their order is what they say."""
+
 from __future__ import annotations
+
+from dataclasses import fields, replace
 
 import casadi as cs
 import numpy as np
 import pytest
 
+import multimodal_to as mt
+from drones import drone
 from multimodal_to.adam import quaternion
-from multimodal_to.ocp.integration import BACKWARD_EULER, Interval
+from multimodal_to.ocp import constraints
+from multimodal_to.ocp.integration import BACKWARD_EULER, STAGGERED, Interval
+from multimodal_to.ocp.knot import Knot
+from multimodal_to.trajectory import rules
+from multimodal_to.trajectory.resampling import regrid, resample
+
+RULES = {BACKWARD_EULER: 1, STAGGERED: 2}
+"""Each rule with its order."""
 
 
 def test_the_gap_closes_when_the_end_is_the_start_plus_rate_times_interval():
@@ -28,3 +41,141 @@ def test_a_constant_angular_velocity_turns_the_whole_angle():
     expected = np.array(whole) @ np.array(quaternion.rotation_matrix(cs.DM(start)))
     assert np.array(quaternion.rotation_matrix(end)) == pytest.approx(expected, abs=1e-12)
     assert float(cs.norm_2(end)) == pytest.approx(1.0, abs=1e-12)
+
+
+def knot(robot, **values):
+    """A knot of zeros but for some variables."""
+    sizes = {"base_quaternion_xyzw": 4, "contact_positions": 3 * len(robot.contacts)}
+    sizes |= dict.fromkeys(("joint_positions", "joint_velocities"), len(robot.joint_names))
+    sizes |= {"contact_forces": sizes["contact_positions"]}
+    sizes |= dict.fromkeys(("thrust", "thrust_rate", "throttle"), len(robot.jets))
+    zeros = {entry.name: cs.SX.zeros(sizes.get(entry.name, 3)) for entry in fields(Knot) if entry.name != "robot"}
+    return Knot(robot, **(zeros | values))
+
+
+def spun(robot, rule, steps):
+    """Where a torque-free body with three different inertias has turned after 1 s, by the problem's own rows."""
+    end, start, duration = cs.SX.sym("end", 7), cs.SX.sym("start", 4), 1.0 / steps
+    momentum = cs.DM([1.0, 0.4, 0.8])
+    interval = Interval(
+        knot(robot, base_quaternion_xyzw=start, angular_momentum=momentum),
+        knot(robot, base_quaternion_xyzw=end[:4], base_angular_velocity=end[4:], angular_momentum=momentum),
+        cs.SX(duration),
+        rule,
+    )
+    rows = cs.vertcat(
+        constraints.base_orientation_integration(interval, None),
+        constraints.angular_momentum_kinematics(interval, None),
+    )
+    step = cs.rootfinder("step", "newton", {"x": end, "p": start, "g": rows}, {"abstol": 1e-13})
+    state = cs.DM([0.0, 0.0, 0.0, 1.0, 2.0, 1.0, 2.0])
+    for _ in range(steps):
+        state = step(state, state[:4])
+    return np.array(state[:4]).ravel()
+
+
+def spooled(robot, rule, steps):
+    """The thrust of the first jet after 2 s of a smooth throttle, by the problem's own rows."""
+    end, start, duration = cs.SX.sym("end", 3), cs.SX.sym("start", 3), 2.0 / steps
+    before, after = (knot(robot, thrust=some[0], thrust_rate=some[1], throttle=some[2]) for some in (start, end))
+    interval = Interval(before, after, cs.SX(duration), rule)
+    rows = cs.vertcat(
+        constraints.thrust_integration(interval, None), constraints.thrust_dynamics(interval, None), end[2] - start[2]
+    )
+    throttle = cs.SX.sym("throttle")
+    rows = cs.substitute(rows, end[2], throttle)
+    unknown = end[:2]
+    step = cs.rootfinder("step", "newton", {"x": unknown, "p": cs.vertcat(start, throttle), "g": rows[:2]})
+    offset, idle = rules.instant(rule.name, "throttle"), robot.jets[0].model.steady_throttle(0.0)
+
+    def at(index):
+        return idle + 60.0 * (1.0 - np.cos(np.pi * max(index - offset, 0.0) * duration / 2.0)) / 2.0
+
+    state = cs.DM([0.0, 0.0])
+    for index in range(steps):
+        state = step(state, cs.vertcat(state, at(index), at(index + 1)))
+    return float(state[0])
+
+
+@pytest.mark.parametrize(("rule", "order"), RULES.items(), ids=lambda value: getattr(value, "name", value))
+def test_a_spinning_body_is_followed_with_the_order_that_the_rule_says(rule, order, tmp_path):
+    robot = drone(tmp_path, jets=False, arm=0.2)
+    exact = spun(robot, STAGGERED, 2000)
+    errors = [np.linalg.norm(spun(robot, rule, steps) - exact) for steps in (20, 40, 80)]
+    slopes = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert slopes == pytest.approx(order, abs=0.15)
+
+
+@pytest.mark.parametrize(("rule", "order"), RULES.items(), ids=lambda value: getattr(value, "name", value))
+def test_a_turbine_spools_with_the_order_that_the_rule_says(rule, order, tmp_path):
+    robot = drone(tmp_path)
+    robot = robot.with_jets(robot.jet_names[:1])
+    exact = spooled(robot, STAGGERED, 2000)
+    errors = [abs(spooled(robot, rule, steps) - exact) for steps in (20, 40, 80)]
+    slopes = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert slopes == pytest.approx(order, abs=0.25)
+
+
+# -------------------------------------------------------------------- a motion by the staggered rule
+
+
+@pytest.fixture(scope="module")
+def touch_down(ironcub):
+    """The landing with half its knots, by either rule."""
+    task = replace(mt.scenarios.landing(), knots=35, interval_min=0.2, interval_max=0.2)
+    formulations = (mt.Formulation.paper(), mt.Formulation.staggered())
+    return [mt.solve(mt.build(ironcub, task, formulation)) for formulation in formulations]
+
+
+def test_a_staggered_motion_passes_the_audit_by_its_own_instants(ironcub, touch_down):
+    _, staggered = touch_down
+    assert staggered.status is mt.Status.OPTIMAL
+    report = mt.audit(ironcub, staggered.trajectory)
+    assert [finding.name for finding in report.findings if not finding.holds] == []
+    wrong = mt.audit(ironcub, replace(staggered.trajectory, rule=rules.BACKWARD_EULER))
+    assert not wrong["force balance"].holds
+    assert not wrong["thrust dynamics"].holds
+
+
+def test_its_thrusts_are_nearer_to_those_of_an_accurate_integrator(ironcub, touch_down):
+    first, second = (mt.audit(ironcub, some.trajectory)["thrust off CVODES, interval"].worst for some in touch_down)
+    assert second < 0.8 * first
+
+
+def test_a_force_of_an_interval_has_its_foot_on_the_ground_at_both_ends(touch_down):
+    motion = touch_down[1].trajectory
+    heights = motion.per_contact("contact_positions")[:, 2]
+    forces = motion.per_contact("contact_forces")[:, 2]
+    assert (forces[:, 1:] * heights[:, :-1]).max() < 5.1e-3
+    assert (forces * heights).max() < 5.1e-3
+
+
+def test_the_file_says_the_rule_and_one_without_it_is_of_backward_euler(touch_down, tmp_path):
+    first, second = (some.trajectory for some in touch_down)
+    file = second.save(tmp_path / "staggered.npz")
+    assert mt.Trajectory.load(file).rule == "staggered"
+    assert mt.Trajectory.load(file).unusual_formulation() == ""
+    with np.load(first.save(tmp_path / "first.npz")) as stored:
+        older = {name: stored[name] for name in stored.files if name != "rule"} | {"format_version": np.array(3)}
+    np.savez(tmp_path / "older.npz", **older)
+    assert mt.Trajectory.load(tmp_path / "older.npz").rule == "backward Euler"
+
+
+def test_other_times_are_read_between_the_instants_of_each_quantity(touch_down):
+    motion = touch_down[1].trajectory
+    middles = 0.5 * (motion.time[1:] + motion.time[:-1])
+    there = resample(motion, middles)
+    assert there.contact_forces == pytest.approx(motion.contact_forces[:, 1:])
+    assert there.com_velocity == pytest.approx(motion.com_velocity[:, 1:])
+    assert there.com_position == pytest.approx(0.5 * (motion.com_position[:, 1:] + motion.com_position[:, :-1]))
+    again = regrid(motion, motion.knots, motion.rule)
+    assert again.throttle == pytest.approx(motion.throttle)
+    assert again.joint_positions == pytest.approx(motion.joint_positions)
+
+
+def test_a_solve_starts_from_a_motion_of_the_other_rule(ironcub, touch_down):
+    task = replace(mt.scenarios.landing(), knots=35, interval_min=0.2, interval_max=0.2)
+    problem = mt.build(ironcub, task, mt.Formulation.staggered())
+    warm = mt.solve(problem, start=touch_down[0].trajectory)
+    assert warm.status is mt.Status.OPTIMAL
+    assert warm.iterations < touch_down[1].iterations

@@ -451,12 +451,17 @@ def test_every_term_of_the_paper_says_its_formula_and_has_a_name_of_its_own():
 
 @dataclass(frozen=True)
 class Midpoint:
-    """φ is the mean of the rates at both ends."""
+    """What acts is the mean of both ends."""
 
     name: str = "trapezoid"
 
     def over(self, quantity, start, end):
         return (quantity(start) + quantity(end)) / 2.0
+
+    driving = over
+
+    def at_velocities(self, end, duration):
+        return end
 
 
 def test_an_integration_rule_of_ones_own_is_one_value(tmp_path):

@@ -41,8 +41,8 @@ def test_files_of_earlier_versions_are_read_and_those_of_a_later_release_refused
         arrays = {name: archive[name] for name in archive.files}
     assert Trajectory.load(path).scenario_json == "{}"
     assert Trajectory.load(path).solve_record() == {"status": "optimal"}
-    np.savez(path, **{**arrays, "format_version": np.array(4)})
-    with pytest.raises(TrajectoryError, match="has format version 4; this release reads 1 to 3"):
+    np.savez(path, **{**arrays, "format_version": np.array(5)})
+    with pytest.raises(TrajectoryError, match="has format version 5; this release reads 1 to 4"):
         Trajectory.load(path)
     del arrays["solve_json"]
     np.savez(path, **{**arrays, "format_version": np.array(2)})

@@ -8,6 +8,8 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Motion, Worst, worst_of
 from multimodal_to.models.terrain import frame_function
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
+from multimodal_to.trajectory import rules
+from multimodal_to.trajectory.derived import at_knots
 
 _SPEEDS = ("com_velocity", "base_linear_velocity", "base_angular_velocity", "joint_velocities")
 
@@ -34,7 +36,8 @@ def _end(motion: Motion, scenario: Scenario) -> list[Worst]:
     if scenario.terminal is Terminal.STANDING:
         findings += _standing("end", motion, last, scenario)
     if scenario.terminal is Terminal.HOVER:
-        findings += [*_hover("end", motion, last), *_equilibrium("end", motion, last)]
+        known = last - bool(rules.instant(motion.trajectory.rule, "com_velocity"))  # no interval follows the last knot
+        findings += [*_hover("end", motion, last), *_equilibrium("end", motion, known)]
     return findings
 
 
@@ -132,7 +135,10 @@ def _equilibrium(when: str, motion: Motion, knot: int) -> list[Worst]:
         knot: at which.
     """
     robot, com = motion.robot, motion.trajectory.com_position[:, knot]
-    forces = np.concatenate([motion.contact_forces[:, knot], motion.thrusts[:, knot]])
+    acting = motion.trajectory.contact_forces  # at the first knot those of the rest before it
+    if knot:
+        acting = at_knots(motion.trajectory, "contact_forces")
+    forces = np.concatenate([acting[:, knot].reshape(-1, 3), motion.thrusts[:, knot]])
     points = np.concatenate([motion.points[:, knot], motion.thrust_points[:, knot]])
     moment = np.cross(points - com, forces).sum(axis=0)
     return [

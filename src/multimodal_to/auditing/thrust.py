@@ -8,7 +8,7 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Worst, worst_of
 from multimodal_to.models.robot import Robot
-from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory import Trajectory, rules
 
 _TOLERANCE = 1e-8  # of the integrator, relative and absolute
 
@@ -16,14 +16,15 @@ _TOLERANCE = 1e-8  # of the integrator, relative and absolute
 def thrust_findings(robot: Robot, trajectory: Trajectory) -> list[Worst]:
     """Compare the thrusts with those that T̈ = f + g gives for the same throttles, integrated by CVODES.
 
-    The throttle of an interval is that of its end, as backward Euler has it. Once every interval starts from the file's
-    T and Ṫ, and once the horizon runs through from the first knot.
+    The throttle of an interval is that which its end holds. Once every interval starts from the file's T and Ṫ, and
+    once the horizon runs through from the first knot. Where the file has Ṫ in the middles of intervals, that of a knot
+    is Ṫ + ½ Δt T̈ under the throttle of the interval before.
     """
     count = len(robot.jets)
     if not count:
         return []
     step, steps = _integrator(robot), np.diff(trajectory.time)
-    states, throttles = np.vstack([trajectory.thrust, trajectory.thrust_rate]), trajectory.throttle
+    states, throttles = np.vstack([trajectory.thrust, _rates(robot, trajectory)]), trajectory.throttle
     alone, through = np.zeros((count, steps.size)), np.zeros((count, steps.size))
     state: Array = states[:, 0]
     for index, dt in enumerate(steps):
@@ -36,6 +37,16 @@ def thrust_findings(robot: Robot, trajectory: Trajectory) -> list[Worst]:
         worst_of("thrust off CVODES, interval", np.abs(alone), names, first=1),
         worst_of("thrust off CVODES, horizon", np.abs(through), names, first=1),
     ]
+
+
+def _rates(robot: Robot, trajectory: Trajectory) -> Array:
+    """Return Ṫ of each jet at the knots [N/s], (jets, knots + 1)."""
+    rates, steps = trajectory.thrust_rate, np.diff(trajectory.time, prepend=trajectory.time[0])
+    accelerations = [
+        jet.model.acceleration(trajectory.thrust[row], rates[row], trajectory.throttle[row])
+        for row, jet in enumerate(robot.jets)
+    ]
+    return np.asarray(rates + rules.instant(trajectory.rule, "thrust_rate") * steps * np.array(accelerations))
 
 
 def _advance(step: cs.Function, state: Array, parameters: Array) -> Array:

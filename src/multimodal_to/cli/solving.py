@@ -163,11 +163,10 @@ def solve(
             autocompletion=completion.linear_solvers,
         ),
     ] = AUTO,
+    staggered: Annotated[bool, typer.Option("--staggered", help="Integrate by the rule of order two.")] = False,
     warm_start: Annotated[Path | None, typer.Option(help="Trajectory of a similar task to start from.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Try a task that the doctor calls hopeless.")] = False,
-    resume: Annotated[
-        Path | None, typer.Option(help="Checkpoint or trajectory of an unfinished solve to go on from, beside it.")
-    ] = None,
+    resume: Annotated[Path | None, typer.Option(help="Checkpoint or trajectory to go on from.")] = None,
     checkpoint: Annotated[
         bool, typer.Option(help="Keep the best iterate in checkpoint.npz while the solve runs.")
     ] = True,
@@ -184,16 +183,16 @@ def solve(
 
     Example: multimodal-to solve --resume results/take-off/checkpoint.npz
     """
-    task = given(name, settings, robot, warm_start=warm_start, resume=resume)
+    task = given(name, settings, robot, staggered=staggered, warm_start=warm_start, resume=resume)
     scenario = task.scenario
     solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit, linear_solver=linear_solver)
     chosen_solver = choose(linear_solver)  # before anything takes time
     console = Console(highlight=False, markup=False, emoji=False, quiet=quiet)
     the_robot = load_robot(task.robot)
-    _refuse_hopeless(examine(the_robot, scenario), console, force)
+    _refuse_hopeless(examine(the_robot, scenario, task.formulation), console, force)
     folder = writable(output or (Path("results") / scenario.name if resume is None else resume.parent))
     started = time.perf_counter()
-    problem = build(the_robot, scenario)
+    problem = build(the_robot, scenario, task.formulation)
     the_robot = problem.robot  # with the jets that the scenario uses
     check_allowances(the_robot, scenario)  # so that a wrong name ends before the solve
     console.print(

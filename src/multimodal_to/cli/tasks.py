@@ -9,23 +9,32 @@ from rich.console import Console
 
 from multimodal_to.cli.common import chosen
 from multimodal_to.errors import InputError, ScenarioError
+from multimodal_to.ocp import Formulation
 from multimodal_to.scenarios.data import stored
 from multimodal_to.scenarios.files import change
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.rules import STAGGERED
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Task:
-    """A scenario for a robot, by its name or folder, and the motion to start from."""
+    """A scenario for a robot, by its name or folder, what its problem is made of, and the motion to start from."""
 
     scenario: Scenario
     robot: str
+    formulation: Formulation
     start: Trajectory | None
 
 
 def given(
-    name: str | None, settings: list[str] | None, robot: str, *, warm_start: Path | None, resume: Path | None
+    name: str | None,
+    settings: list[str] | None,
+    robot: str,
+    *,
+    staggered: bool,
+    warm_start: Path | None,
+    resume: Path | None,
 ) -> Task:
     """Return the task that the options of `solve` ask for.
 
@@ -33,6 +42,7 @@ def given(
         name: of a bundled scenario, or its TOML file.
         settings: changes as `KEY=VALUE`.
         robot: name or folder; empty for the file's own, or the iRonCub.
+        staggered: whether the problem is integrated by the staggered rule.
         warm_start: trajectory file of a similar task.
         resume: checkpoint or trajectory file of an unfinished solve.
 
@@ -44,7 +54,8 @@ def given(
         if name is None:
             raise InputError("nothing to solve; expected the NAME of a scenario, or --resume FILE")
         start = None if warm_start is None else Trajectory.load(warm_start)
-        return Task(scenario=chosen(name, settings), robot=robot or "ironcub", start=start)
+        formulation = Formulation.staggered() if staggered else Formulation.paper()
+        return Task(scenario=chosen(name, settings), robot=robot or "ironcub", formulation=formulation, start=start)
     if warm_start is not None:
         raise InputError("--resume and --warm-start both say what to start from; expected one of them")
     start = Trajectory.load(resume)
@@ -52,6 +63,11 @@ def given(
         raise InputError(
             f"'{resume}' is of a problem that this command does not have ({unusual}); go on from it in the script that "
             "makes these terms, with solve(problem, start=Trajectory.load(...))"
+        )
+    if staggered and start.rule != STAGGERED:
+        raise InputError(
+            f"'{resume}' is integrated by {start.rule}, and --resume goes on with its own rule; --warm-start starts a "
+            "staggered solve from it"
         )
     scenario = stored(start)
     if scenario is None:
@@ -62,7 +78,8 @@ def given(
             f"'{resume}' is of '{scenario.name}' with other values than asked for; --resume goes on with its own, "
             "--warm-start starts a changed task from it"
         )
-    return Task(scenario=scenario, robot=robot or start.robot, start=start)
+    formulation = Formulation.of_rule(start.rule)
+    return Task(scenario=scenario, robot=robot or start.robot, formulation=formulation, start=start)
 
 
 def free_checkpoint(folder: Path, resume: Path | None, console: Console) -> Path:

@@ -15,10 +15,13 @@ from multimodal_to.errors import OutputError
 from multimodal_to.files.writing import whole
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import QUANTITIES, Trajectory, labels
-from multimodal_to.trajectory.derived import base_poses, generalised_forces
+from multimodal_to.trajectory.derived import base_poses, generalised_forces, sampled
 
 _NAMES = ("joint_names", "contact_names", "jet_names")
-_RATES = "Rates at knot k are those of the interval that ends at k (backward Euler); at knot 0 they are not used."
+_RATES = (
+    "Rates at knot k are those of the interval that ends at k where backward Euler was the rule, and none at knot 0; "
+    "where the rule was staggered, all quantities are at the knots."
+)
 CONVENTIONS = (
     "Time in s. All vectors are in world axes, z up. Quaternions are world-from-base, x y z w.",
     _RATES,
@@ -28,6 +31,7 @@ CONVENTIONS = (
 
 def columns(trajectory: Trajectory) -> dict[str, tuple[str, Array]]:
     """Return every row of every quantity by name, as ``joint_positions.l_knee``, with its unit and values."""
+    trajectory = sampled(trajectory)
     table = {"time": ("s", trajectory.time)}
     for name, quantity in QUANTITIES.items():
         for row, label in enumerate(labels(name, trajectory, separator=".")):
@@ -69,6 +73,7 @@ def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
         from scipy.io import savemat
     except ImportError as error:
         raise OutputError("MATLAB files need SciPy: pip install 'multimodal-to[mat]'") from error
+    trajectory = sampled(trajectory)
     content = {
         "robot": trajectory.robot,
         "scenario": trajectory.scenario,
@@ -94,6 +99,7 @@ def write_mujoco(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[s
         trajectory: the motion.
         path: of the file, by convention `.npz`.
     """
+    torques, trajectory = generalised_forces(robot, trajectory)[6:], sampled(trajectory)
     parts = {
         "qpos": [trajectory.base_position, _unit_quaternions(trajectory)[[3, 0, 1, 2]], trajectory.joint_positions],
         "qvel": [
@@ -101,7 +107,7 @@ def write_mujoco(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[s
             _in_base(trajectory, "base_angular_velocity"),
             trajectory.joint_velocities,
         ],
-        "ctrl": [generalised_forces(robot, trajectory)[6:], trajectory.thrust],
+        "ctrl": [torques, trajectory.thrust],
     }
     return _write_arrays(
         robot,
@@ -127,6 +133,7 @@ def write_pinocchio(robot: Robot, trajectory: Trajectory, path: str | os.PathLik
         trajectory: the motion.
         path: of the file, by convention `.npz`.
     """
+    torques, trajectory = generalised_forces(robot, trajectory)[6:], sampled(trajectory)
     parts = {
         "q": [trajectory.base_position, _unit_quaternions(trajectory), trajectory.joint_positions],
         "v": [
@@ -134,7 +141,7 @@ def write_pinocchio(robot: Robot, trajectory: Trajectory, path: str | os.PathLik
             _in_base(trajectory, "base_angular_velocity"),
             trajectory.joint_velocities,
         ],
-        "tau": [generalised_forces(robot, trajectory)[6:]],
+        "tau": [torques],
     }
     return _write_arrays(
         robot,

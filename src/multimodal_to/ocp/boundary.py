@@ -8,6 +8,7 @@ from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.variables import Bounds
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
+from multimodal_to.trajectory import rules
 
 _AT_REST = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
 _NO_FORCE = 0.01
@@ -17,7 +18,7 @@ _UPRIGHT = 1e-3
 _ORIENTATION = np.array([0.0, 0.0, 0.0, 1.0])
 
 
-def set_boundary(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture) -> None:
+def set_boundary(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture, rule: str) -> None:
     """Hold the first and last knots as the scenario says.
 
     Args:
@@ -25,9 +26,10 @@ def set_boundary(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Pos
         robot: with the jets that the scenario uses.
         scenario: the task.
         standing: the posture that a motion that starts on its feet starts in.
+        rule: name of the integration rule.
     """
     _set_start(bounds, robot, scenario, standing)
-    _set_end(bounds, scenario)
+    _set_end(bounds, scenario, rule)
     if scenario.mid_height_min is not None:
         low = bounds.lower["com_position"]
         low[2, scenario.knots // 2] = max(low[2, scenario.knots // 2], scenario.mid_height_min)
@@ -51,7 +53,7 @@ def _set_start(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Postu
     fix("throttle", 0, np.array(idle))
 
 
-def _set_end(bounds: Bounds, scenario: Scenario) -> None:
+def _set_end(bounds: Bounds, scenario: Scenario, rule: str) -> None:
     fix, last = bounds.fix, scenario.knots
     fix("com_position", last, np.array(scenario.final_com))
     if scenario.terminal is Terminal.FREE:
@@ -65,5 +67,9 @@ def _set_end(bounds: Bounds, scenario: Scenario) -> None:
     if scenario.terminal is Terminal.HOVER:
         for knot in (last - 1, last):
             fix("thrust_rate", knot, 0.0)
-        fix("contact_forces", last, 0.0, within=_NO_FORCE)
+        over_intervals = bool(
+            rules.instant(rule, "contact_forces")
+        )  # then the last two forces meet where the robot rests
+        for knot in (last - 1, last) if over_intervals else (last,):
+            fix("contact_forces", knot, 0.0, within=_NO_FORCE)
         fix("base_quaternion_xyzw", last, _ORIENTATION, within=_UPRIGHT)

@@ -23,12 +23,14 @@ def com_kinematics(knot: Knot, parameters: Parameters) -> SX:
     return knot.com_position - com
 
 
-def angular_momentum_kinematics(knot: Knot, parameters: Parameters) -> SX:
+def angular_momentum_kinematics(interval: Interval, parameters: Parameters) -> SX:
     """hω − [0 1] J_CMM(q) ν = 0 (eq. 16), with the CoM taken from its own variable.
 
     Momenta about the base's origin, moved to the CoM: hω = R k − (x − p) × R l. The sum over the limbs then stays a
-    sum in the Hessian, where the product of their CoM and their linear momentum would couple each limb with each.
+    sum in the Hessian, where the product of their CoM and their linear momentum would couple each limb with each. All
+    at the instant of the velocities.
     """
+    knot = interval.at_velocities
     base = knot.base
     turning = base.rotation.T @ knot.base_angular_velocity
     momentum, _ = rigid_body.momentum_in_base(
@@ -69,6 +71,15 @@ def complementarity(knot: Knot, parameters: Parameters) -> SX:
     return cs.vertcat(*products)
 
 
+def complementarity_before(interval: Interval, parameters: Parameters) -> SX:
+    """d(p_i) n·f_i⁺ ≤ ε_n: a force that belongs to an interval needs its point on the ground at the start as well."""
+    products = [
+        contact.complementarity(parameters.surface, point, force)
+        for point, force in zip(interval.start.points, interval.end.forces, strict=True)
+    ]
+    return cs.vertcat(*products)
+
+
 def contact_reach(knot: Knot, parameters: Parameters) -> SX:
     """|p_i − x| within the robot's `contact_reach`, by axis, as a fraction of it."""
     arms = [(point - knot.com_position) / cs.DM(knot.robot.contact_reach) for point in knot.points]
@@ -104,8 +115,8 @@ def momentum_dynamics(interval: Interval, parameters: Parameters) -> SX:
     """m (ẋ⁺ − ẋ) = Δt (m g + Σ f⁺) and hω⁺ − hω = Δt Σ (p⁺ − x⁺) × f⁺ (eq. 14 with gravity, 24a, 24c)."""
     mass = parameters.robot.mass
     return cs.vertcat(
-        interval.gap(lambda knot: knot.com_velocity, lambda knot: knot.momentum_rate[0] / mass),
-        interval.gap(lambda knot: knot.angular_momentum, lambda knot: knot.momentum_rate[1]),
+        interval.velocity_gap(lambda knot: knot.com_velocity, lambda knot: knot.momentum_rate[0] / mass),
+        interval.velocity_gap(lambda knot: knot.angular_momentum, lambda knot: knot.momentum_rate[1]),
     )
 
 
@@ -136,7 +147,7 @@ def thrust_integration(interval: Interval, parameters: Parameters) -> SX:
 
 def thrust_dynamics(interval: Interval, parameters: Parameters) -> SX:
     """Ṫ⁺ − Ṫ − (f(T⁺, Ṫ⁺) + g(T⁺, Ṫ⁺, u⁺)) Δt = 0 (eq. 23, 26b)."""
-    return interval.gap(lambda knot: knot.thrust_rate, thrust_acceleration)
+    return interval.velocity_gap(lambda knot: knot.thrust_rate, thrust_acceleration)
 
 
 def sliding(interval: Interval, parameters: Parameters) -> SX:

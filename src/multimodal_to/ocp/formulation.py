@@ -9,10 +9,11 @@ from dataclasses import dataclass, fields, replace
 
 from multimodal_to.errors import FormulationError, listed, shown, unknown
 from multimodal_to.ocp import paper
-from multimodal_to.ocp.integration import BACKWARD_EULER, IntegrationRule
+from multimodal_to.ocp.integration import BACKWARD_EULER, STAGGERED, IntegrationRule
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.terms import Constraint, Cost, Term
 from multimodal_to.ocp.variables import INTERVAL_SCALE, VARIABLES, Variable
+from multimodal_to.trajectory import rules
 
 _NEEDED = tuple(entry.name for entry in fields(Knot) if entry.name != "robot")
 
@@ -50,6 +51,15 @@ class Formulation:
         """Return the problem of L'Erario et al. 2022, which `build` takes by default."""
         return cls(terms=paper.TERMS)
 
+    @classmethod
+    def staggered(cls) -> Formulation:
+        """Return the same problem integrated by the staggered rule, which is of order two.
+
+        Contact forces and throttles belong to intervals and velocities to their middles, so a force needs its foot on
+        the ground at both ends of its interval, and the motion is what its forces make of it between the knots as well.
+        """
+        return cls(terms=(*paper.TERMS, *paper.STAGGERED), rule=STAGGERED)
+
     @property
     def constraints(self) -> tuple[Constraint, ...]:
         """Return the constraints, in order."""
@@ -63,7 +73,7 @@ class Formulation:
     @property
     def own_terms(self) -> tuple[str, ...]:
         """Return the names of the terms that are not the paper's."""
-        return tuple(term.name for term in self.terms if term not in paper.TERMS)
+        return tuple(term.name for term in self.terms if term not in (*paper.TERMS, *paper.STAGGERED))
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -102,6 +112,18 @@ class Formulation:
                 raise FormulationError(unknown("variable", name, known))
         changed = (Variable(entry.name, scales.get(entry.name, entry.scale)) for entry in self.variables)
         return replace(self, variables=tuple(changed))
+
+    @classmethod
+    def of_rule(cls, name: str) -> Formulation:
+        """Return the formulation that integrates by the rule of a name, as a trajectory's file says it.
+
+        Raises:
+            FormulationError: there is no rule of that name.
+        """
+        known = {rules.BACKWARD_EULER: cls.paper, rules.STAGGERED: cls.staggered}
+        if name not in known:
+            raise FormulationError(unknown("integration rule", name, known))
+        return known[name]()
 
     def described(self) -> dict[str, object]:
         """Return what the record of a solve says of the formulation: its rule, and what differs from the paper's."""

@@ -1,54 +1,143 @@
-"""Integration rules: what acts over an interval, of quantities that are known at its two ends (eq. 24 to 27)."""
+"""Integration rules: how the knots of an interval are tied, as a value of the formulation."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import SX
 from multimodal_to.ocp.knot import Knot
-from multimodal_to.trajectory.trajectory import PAPER_RULE
+from multimodal_to.trajectory import rules
+
+KnotQuantity = Callable[[Knot], SX]
+"""A quantity as a function of a knot, (m, 1)."""
 
 
 class IntegrationRule(Protocol):
-    """A one-step rule: y⁺ = y + φ Δt, where the rule says what the rate φ is."""
+    """Says what acts between two knots. Positions y follow y⁺ = y + v Δt, velocities v follow v⁺ = v + a Δt."""
 
     @property
     def name(self) -> str:
-        """Return what the record of a solve calls it."""
+        """Return what a trajectory calls it."""
         ...
 
-    def over(self, quantity: Callable[[Knot], SX], start: Knot, end: Knot) -> SX:
-        """Return φ: what a quantity of knots is over the interval between two of them.
+    def over(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
+        """Return what a quantity is over the interval: a velocity, which moves positions, or a contact force.
 
         Args:
-            quantity: a function of a knot, such as its CoM velocity, or the rate of the thrust that its throttle makes.
+            quantity: as a function of a knot.
             start: the interval's first knot.
             end: the interval's second knot.
+        """
+        ...
+
+    def driving(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
+        """Return what a quantity is between the velocities of two knots: an acceleration, which changes velocities.
+
+        Args:
+            quantity: as a function of a knot.
+            start: the knot whose velocities are changed.
+            end: the knot whose velocities come out.
+        """
+        ...
+
+    def at_velocities(self, end: Knot, duration: SX) -> Knot:
+        """Return the configuration at the instant of the velocities that a knot holds.
+
+        Args:
+            end: the knot that holds the velocities.
+            duration: Δt of the interval that ends there [s].
         """
         ...
 
 
 @dataclass(frozen=True)
 class BackwardEuler:
-    """φ is the rate at the interval's end: y⁺ = y + ẏ⁺ Δt. It is the paper's rule, of order one."""
+    """Everything is at the interval's end: y⁺ = y + v⁺ Δt, v⁺ = v + a⁺ Δt. The paper's rule, of order one."""
 
-    name: str = PAPER_RULE
+    name: str = rules.BACKWARD_EULER
 
-    def over(self, quantity: Callable[[Knot], SX], start: Knot, end: Knot) -> SX:
+    def over(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
         """Return the quantity at the interval's end.
 
         Args:
-            quantity: a function of a knot.
+            quantity: as a function of a knot.
             start: the interval's first knot.
             end: the interval's second knot.
         """
         return quantity(end)
 
+    def driving(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
+        """Return the quantity at the interval's end.
+
+        Args:
+            quantity: as a function of a knot.
+            start: the interval's first knot.
+            end: the interval's second knot.
+        """
+        return quantity(end)
+
+    def at_velocities(self, end: Knot, duration: SX) -> Knot:
+        """Return the knot itself."""
+        return end
+
 
 BACKWARD_EULER = BackwardEuler()
+
+
+@dataclass(frozen=True)
+class Staggered:
+    """Velocities, contact forces and throttles are those of intervals, at their middles; configurations are at knots.
+
+    y_k+1 = y_k + v_k+½ Δt and v_k+½ = v_k−½ + a_k Δt, where a_k has the configuration of knot k and the mean of the
+    forces of the two intervals that meet there. Of order two; a foot that stands has no velocity that could ring.
+    A knot k holds what belongs to the interval that ends there.
+    """
+
+    name: str = rules.STAGGERED
+
+    def over(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
+        """Return the quantity of the interval, which its end holds.
+
+        Args:
+            quantity: as a function of a knot.
+            start: the interval's first knot.
+            end: the interval's second knot.
+        """
+        return quantity(end)
+
+    def driving(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
+        """Return the quantity at the interval's start, where two intervals meet, with the mean of what they hold.
+
+        Args:
+            quantity: as a function of a knot.
+            start: the knot at which the intervals meet, which holds the first one's velocities and forces.
+            end: the knot that holds the second one's.
+        """
+        means = {name: 0.5 * (getattr(start, name) + getattr(end, name)) for name in rules.OVER_INTERVALS}
+        return quantity(replace(start, **means))
+
+    def at_velocities(self, end: Knot, duration: SX) -> Knot:
+        """Return the configuration in the middle of the interval: half a step back from its end.
+
+        Args:
+            end: the interval's second knot.
+            duration: Δt [s].
+        """
+        half = 0.5 * duration
+        turn = quaternion.exp(-half * end.base_angular_velocity)
+        return replace(
+            end,
+            com_position=end.com_position - half * end.com_velocity,
+            base_position=end.base_position - half * end.base_linear_velocity,
+            base_quaternion_xyzw=quaternion.product(turn, end.base_quaternion_xyzw),
+            joint_positions=end.joint_positions - half * end.joint_velocities,
+        )
+
+
+STAGGERED = Staggered()
 
 
 @dataclass(frozen=True)
@@ -60,20 +149,35 @@ class Interval:
     duration: SX  # Δt [s], (1, 1)
     rule: IntegrationRule
 
-    def over(self, quantity: Callable[[Knot], SX]) -> SX:
-        """Return what a quantity of knots is over the interval, by its rule."""
+    @property
+    def at_velocities(self) -> Knot:
+        """Return the configuration at the instant of the velocities that the interval's end holds."""
+        return self.rule.at_velocities(self.end, self.duration)
+
+    def over(self, quantity: KnotQuantity) -> SX:
+        """Return what a quantity of knots, such as a velocity or a contact force, is over the interval."""
         return self.rule.over(quantity, self.start, self.end)
 
-    def gap(self, quantity: Callable[[Knot], SX], rate: Callable[[Knot], SX]) -> SX:
-        """Return y⁺ − y − φ Δt, which is zero where the interval closes.
+    def gap(self, quantity: KnotQuantity, rate: KnotQuantity) -> SX:
+        """Return y⁺ − y − v Δt of something like a position, which is zero where the interval closes.
 
         Args:
             quantity: y as a function of a knot, (m, 1).
-            rate: ẏ as a function of a knot, (m, 1).
+            rate: v as a function of a knot, (m, 1).
         """
         return quantity(self.end) - quantity(self.start) - self.over(rate) * self.duration
 
-    def rotation_gap(self, orientation: Callable[[Knot], SX], angular_velocity: Callable[[Knot], SX]) -> SX:
+    def velocity_gap(self, quantity: KnotQuantity, rate: KnotQuantity) -> SX:
+        """Return v⁺ − v − a Δt of something like a velocity, which is zero where its change is explained.
+
+        Args:
+            quantity: v as a function of a knot, (m, 1).
+            rate: a as a function of a knot, (m, 1).
+        """
+        acting = self.rule.driving(rate, self.start, self.end)
+        return quantity(self.end) - quantity(self.start) - acting * self.duration
+
+    def rotation_gap(self, orientation: KnotQuantity, angular_velocity: KnotQuantity) -> SX:
         """Return ρ⁺ − Exp(ω Δt) ∘ ρ, (4, 1), which is zero where the interval closes (eq. 25b).
 
         Args:
@@ -83,6 +187,6 @@ class Interval:
         turn = quaternion.exp(self.over(angular_velocity) * self.duration)
         return orientation(self.end) - quaternion.product(turn, orientation(self.start))
 
-    def rate(self, quantity: Callable[[Knot], SX]) -> SX:
+    def rate(self, quantity: KnotQuantity) -> SX:
         """Return (y⁺ − y) / Δt, the mean rate of a quantity of knots."""
         return (quantity(self.end) - quantity(self.start)) / self.duration

@@ -55,9 +55,9 @@ def formulate(robot: Robot, scenario: Scenario, standing: Posture, formulation: 
     box = ranges(robot, scenario, layout)
     bounds = box.copy()
     stages, held = collect(formulation, Parameters.of(robot, scenario, standing), layout, bounds)
-    set_boundary(box, robot, scenario, standing)
+    set_boundary(box, robot, scenario, standing, formulation.rule.name)
     try:
-        set_boundary(bounds, robot, scenario, standing)
+        set_boundary(bounds, robot, scenario, standing, formulation.rule.name)
     except ScenarioError as error:  # without the terms it fits, as the line before has shown
         terms = dict.fromkeys(some.term for some in held if str(error).startswith(f"{some.variable}[{some.row}]"))
         raise FormulationError(f"the term '{listed(terms)}' contradicts the start or the end: {error}") from error

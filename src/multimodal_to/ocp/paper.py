@@ -44,6 +44,10 @@ def _hovers_first(parameters: Parameters) -> bool:
     return parameters.scenario.start is Start.HOVER
 
 
+def _hovers_last(parameters: Parameters) -> bool:
+    return parameters.scenario.terminal is Terminal.HOVER
+
+
 def _stands_last(parameters: Parameters) -> bool:
     return parameters.scenario.terminal is Terminal.STANDING
 
@@ -58,7 +62,7 @@ ANGULAR_MOMENTUM_KINEMATICS = Constraint(
     value=constraints.angular_momentum_kinematics,
     within=equal(),
     unit="kg m²/s",
-    holds=Where.LATER_KNOTS,
+    holds=Where.EVERY_INTERVAL,
     labels=XYZ,
 )
 CONTACT_KINEMATICS = Constraint(
@@ -180,6 +184,36 @@ STANDING_HEIGHT = Constraint(
     when=_stands_last,
     rigid=True,
 )
+
+COMPLEMENTARITY_BEFORE = Constraint(
+    value=constraints.complementarity_before,
+    within=at_most(lambda parameters: parameters.scenario.complementarity_max),
+    unit="N m",
+    holds=Where.EVERY_INTERVAL,
+    labels=_each("contact"),
+)
+FINAL_EQUILIBRIUM = Constraint(
+    name="final_equilibrium",
+    value=constraints.static_equilibrium,
+    within=equal(),
+    unit=("N", "N", "N", "N m", "N m", "N m"),
+    holds=Where.LAST_KNOT,
+    scale=FORCE,
+    labels=TWIST,
+    when=_stands_last,
+)
+FINAL_STEADY_THRUST = Constraint(
+    name="final_steady_thrust",
+    value=constraints.steady_thrust,
+    within=equal(),
+    unit="N/s²",
+    holds=Where.LAST_KNOT,
+    scale=FORCE,
+    labels=_each("jet"),
+    when=_hovers_last,
+)
+STAGGERED = (COMPLEMENTARITY_BEFORE, FINAL_EQUILIBRIUM, FINAL_STEADY_THRUST)
+"""What the staggered rule asks for beside: its forces belong to intervals, and no interval follows the last knot."""
 
 CONSTRAINTS = (
     UNIT_QUATERNION,

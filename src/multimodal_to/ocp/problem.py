@@ -15,7 +15,7 @@ from multimodal_to.ocp.transcription import Nlp
 from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import QUANTITIES, Trajectory
-from multimodal_to.trajectory.resampling import resample
+from multimodal_to.trajectory.resampling import regrid
 from multimodal_to.trajectory.sameness import refuse_other_robot
 
 
@@ -84,7 +84,7 @@ class Problem:
         """
         refuse_other_robot(trajectory, self.robot, what="the motion to start from")
         knots = self.scenario.knots
-        motion = resample(trajectory, np.linspace(trajectory.time[0], trajectory.time[-1], knots + 1))
+        motion = regrid(trajectory, knots, self.formulation.rule.name)
         values = np.vstack([getattr(motion, name) for name in self.layout.rows])
         x = np.append(values.ravel(order="F"), trajectory.duration / knots) / self.scale
         return np.clip(x, self.lower, self.upper)

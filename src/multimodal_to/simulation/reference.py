@@ -8,7 +8,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
-from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory import Trajectory, rules
 from multimodal_to.trajectory.derived import base_poses, generalised_forces
 from multimodal_to.trajectory.resampling import resample
 
@@ -32,6 +32,9 @@ class Reference:
 
 def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) -> Reference:
     """Return a plan at times since its start [s].
+
+    Where the plan's rule has contact forces and thrust rates over intervals, they are read in the middles of these, as
+    its velocities are.
 
     Backward Euler holds the velocity of knot k over the interval that ends there, so velocities are read half an
     interval later than positions; its throttle is held as well. So the velocity changes from that of knot k to that of
@@ -57,8 +60,12 @@ def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) 
     def rate(values: Array) -> Array:
         return np.asarray(at(values, own + interval / 2.0) * moving)
 
+    def acting(name: str) -> Array:
+        return at(getattr(plan, name), times + rules.instant(plan.rule, name) * interval)
+
     torques = generalised_forces(robot, plan)[6:]
-    torques[:, 0] = torques[:, 1]  # a trajectory doesn't tell the accelerations of its first knot
+    if not rules.instant(plan.rule, "joint_velocities"):
+        torques[:, 0] = torques[:, 1]  # such a trajectory doesn't tell the accelerations of its first knot
     held = np.minimum(np.searchsorted(knots, times - 1e-9), plan.knots)
     return Reference(
         com=at(plan.com_position, own),
@@ -68,9 +75,9 @@ def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) 
         joints=at(plan.joint_positions, own),
         joint_velocities=rate(plan.joint_velocities),
         torques=at(torques, times),
-        contact_forces=at(plan.contact_forces, times).reshape(times.size, -1, 3),
+        contact_forces=acting("contact_forces").reshape(times.size, -1, 3),
         thrust=at(plan.thrust, times),
-        thrust_rate=at(plan.thrust_rate, times) * spooling,
+        thrust_rate=acting("thrust_rate") * spooling,
         throttle=plan.throttle[:, held].T,
     )
 

@@ -34,6 +34,7 @@ def motion(problem: Problem, x: Array, solve_json: str = "") -> Trajectory:
         scenario=problem.scenario.name,
         scenario_json=_kept(problem.scenario),
         solve_json=solve_json,
+        rule=problem.formulation.rule.name,
         time=time_grid,
         joint_names=robot.joint_names,
         contact_names=robot.contact_names,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as cs
 import numpy as np
@@ -13,6 +14,9 @@ from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import Array, homogeneous
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import Surface, frame_function
+from multimodal_to.trajectory import rules
+from multimodal_to.trajectory.quantities import QUANTITIES
+from multimodal_to.trajectory.resampling import resample
 from multimodal_to.trajectory.trajectory import Trajectory
 
 FLIGHT_FORCE = 1.0
@@ -144,21 +148,64 @@ def flight_phases(trajectory: Trajectory) -> list[tuple[float, float]]:
     return [(float(trajectory.time[i]), float(trajectory.time[j])) for i, j in zip(starts, ends, strict=True)]
 
 
+def at_knots(trajectory: Trajectory, name: str) -> Array:
+    """Return a quantity at the instants of the knots, (rows, knots + 1).
+
+    Under a staggered rule two intervals meet at a knot, and it is the mean of theirs; an acceleration is that between
+    them. After the last knot there is no interval: there it is that of the last one, and an acceleration is zero.
+    """
+    values: Array = getattr(trajectory, name)
+    before = rules.instant(trajectory.rule, name)
+    if not before:
+        return values
+    if before < 1.0:
+        return 0.5 * (values + np.hstack([values[:, 1:], values[:, -1:]]))
+    return np.hstack([values[:, 1:], np.zeros_like(values[:, -1:])])
+
+
+def sampled(trajectory: Trajectory) -> Trajectory:
+    """Return the trajectory with every quantity at the instant of its knot, as `at_knots` has it."""
+    if all(not rules.instant(trajectory.rule, name) for name in QUANTITIES):
+        return trajectory
+    arrays: dict[str, Any] = {name: at_knots(trajectory, name) for name in QUANTITIES}
+    return replace(trajectory, rule=rules.SAMPLED, **arrays)
+
+
+def accelerations_at_knots(trajectory: Trajectory, name: str) -> Array:
+    """Return the rate of a velocity or a momentum at the instants of the knots, (rows, knots + 1).
+
+    Differences of columns, divided by Δt: backward ones where all is at the knots, with zero at the first; forward ones
+    where velocities are in the middles of intervals, with zero at the last.
+    """
+    values: Array = getattr(trajectory, name)
+    rates = np.diff(values, axis=1) / np.diff(trajectory.time)
+    nothing = np.zeros_like(values[:, :1])
+    return np.hstack([rates, nothing] if rules.instant(trajectory.rule, name) else [nothing, rates])
+
+
+def at_velocities(trajectory: Trajectory) -> Trajectory:
+    """Return the trajectory with the configurations at the instants of its velocities."""
+    if not rules.instant(trajectory.rule, "joint_velocities"):
+        return trajectory
+    times = trajectory.time - 0.5 * np.diff(trajectory.time, prepend=trajectory.time[0])
+    middle = resample(replace(trajectory, rule=rules.SAMPLED), times)
+    names = ("com_position", "base_position", "base_quaternion_xyzw", "joint_positions")
+    return replace(trajectory, **{name: getattr(middle, name) for name in names})
+
+
 def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
     """Return what the motion asks of base and joints under all contact forces and thrusts, (6 + n, knots + 1).
 
     τ = M ν̇ + C ν + g − Σ Jᵀ f by RNEA: the wrench left for the base [N, N m], which is zero on a true motion, then the
-    joint torques [N m]. Accelerations are backward differences of the velocities, zero at the first knot.
+    joint torques [N m]. All is at the instants of the knots: `at_knots`, `accelerations_at_knots`.
     """
     count = trajectory.time.size
-    velocities = np.vstack(
-        [trajectory.base_linear_velocity, trajectory.base_angular_velocity, trajectory.joint_velocities]
-    )
-    steps = np.diff(trajectory.time, prepend=trajectory.time[0] - 1.0)
-    accelerations = np.diff(velocities, axis=1, prepend=velocities[:, :1]) / steps
+    names = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
+    velocities = np.vstack([at_knots(trajectory, name) for name in names])
+    accelerations = np.vstack([accelerations_at_knots(trajectory, name) for name in names])
     frames = (*trajectory.contact_names, *(jet.frame for jet in robot.jets))
     thrusts = thrust_forces(robot, trajectory)[1].transpose(0, 2, 1)
-    forces = [*trajectory.per_contact("contact_forces"), *thrusts]
+    contacts = at_knots(trajectory, "contact_forces").reshape(len(trajectory.contact_names), 3, count)
     return np.array(
         robot.kindyn.rnea_fun(frames).map(count)(
             np.hstack(list(base_poses(trajectory))),
@@ -167,6 +214,6 @@ def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
             velocities[6:],
             accelerations[:6],
             accelerations[6:],
-            *(np.vstack([force, np.zeros((3, count))]) for force in forces),
+            *(np.vstack([force, np.zeros((3, count))]) for force in (*contacts, *thrusts)),
         )
     )

@@ -11,6 +11,7 @@ FORMATS: Mapping[int, str] = MappingProxyType(
         1: "all quantities, time, names of robot and scenario",
         2: "adds `scenario_json`",
         3: "adds `solve_json`",
+        4: "adds `rule`",
     }
 )
 """The versions of the file that are read, and what each one brought."""
@@ -39,6 +40,11 @@ ENTRIES: Mapping[str, Entry] = MappingProxyType(
         ),
         "solve_json": Entry(
             kind="text, JSON", since=3, meaning="how it was solved; empty where no solver made the motion"
+        ),
+        "rule": Entry(
+            kind="text",
+            since=4,
+            meaning="name of the integration rule, which says at which instant of the interval each quantity is",
         ),
         "time": Entry(kind="numbers, (N + 1,)", meaning="time of the knots [s], increasing"),
         "knots": Entry(

@@ -1,22 +1,24 @@
-"""A trajectory at other times than its knots."""
+"""A trajectory at other times than its knots, or on another grid of knots."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError
+from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.quantities import QUANTITIES
 from multimodal_to.trajectory.trajectory import Trajectory
 
 
 def resample(trajectory: Trajectory, times: Array) -> Trajectory:
-    """Return the trajectory at other times [s] on its grid or between: linear, and the shortest turn of the base.
+    """Return the trajectory at other times [s], on its grid or between: linear, and the shortest turn of the base.
 
-    Between knots k and k + 1, at the share a of the interval, q = q_k ∘ Exp(a Log(q_k⁻¹ ∘ q_{k+1})); every other
-    quantity is (1 − a) y_k + a y_{k+1}.
+    Between the instants of two columns, at the share a of the time between them, a quantity is (1 − a) y_k + a y_k+1,
+    and the base's orientation q_k ∘ Exp(a Log(q_k⁻¹ ∘ q_k+1)). Every quantity of the result is at its own time.
 
     Raises:
         InputError: a time is not within the trajectory.
@@ -24,16 +26,42 @@ def resample(trajectory: Trajectory, times: Array) -> Trajectory:
     wanted, grid = np.asarray(times, dtype=float), trajectory.time
     if wanted.size and not (grid[0] <= wanted.min() and wanted.max() <= grid[-1]):
         raise InputError(f"times from {wanted.min():g} to {wanted.max():g} s; expected {grid[0]:g} to {grid[-1]:g} s")
-    before = np.clip(np.searchsorted(grid, wanted, side="right") - 1, 0, grid.size - 2)
-    share = (wanted - grid[before]) / (grid[before + 1] - grid[before])
-    arrays = {
-        name: (1.0 - share) * getattr(trajectory, name)[:, before] + share * getattr(trajectory, name)[:, before + 1]
-        for name in QUANTITIES
+    moved = any(rules.instant(trajectory.rule, name) for name in QUANTITIES)
+    arrays: dict[str, Any] = {name: _at(trajectory, name, wanted) for name in QUANTITIES}
+    return replace(trajectory, time=wanted, rule=rules.SAMPLED if moved else trajectory.rule, **arrays)
+
+
+def regrid(trajectory: Trajectory, knots: int, rule: str) -> Trajectory:
+    """Return the trajectory on equal intervals, with every quantity at the instant that a rule wants.
+
+    Args:
+        trajectory: of any rule.
+        knots: N, the number of intervals.
+        rule: name of the integration rule.
+    """
+    grid = np.linspace(trajectory.time[0], trajectory.time[-1], knots + 1)
+    arrays: dict[str, Any] = {
+        name: _at(trajectory, name, _instants(grid, rules.instant(rule, name))) for name in QUANTITIES
     }
-    start = trajectory.base_quaternion_xyzw[:, before]
-    end = trajectory.base_quaternion_xyzw[:, before + 1]
-    arrays["base_quaternion_xyzw"] = _slerp(start, end, share)
-    return replace(trajectory, time=wanted, **arrays)
+    return replace(trajectory, time=grid, rule=rule, **arrays)
+
+
+def _at(trajectory: Trajectory, name: str, times: Array) -> Array:
+    """Return a quantity at times [s]; before its first instant and after its last it is what it is there."""
+    values = getattr(trajectory, name)
+    own = _instants(trajectory.time, rules.instant(trajectory.rule, name))
+    wanted = np.clip(times, own[0], own[-1])
+    before = np.clip(np.searchsorted(own, wanted, side="right") - 1, 0, own.size - 2)
+    share = (wanted - own[before]) / (own[before + 1] - own[before])
+    start, end = values[:, before], values[:, before + 1]
+    if name == "base_quaternion_xyzw":
+        return _slerp(start, end, share)
+    return np.asarray((1.0 - share) * start + share * end)
+
+
+def _instants(grid: Array, before: float) -> Array:
+    """Return the times that lie a share of an interval before each knot [s]."""
+    return np.asarray(grid - before * np.diff(grid, prepend=2 * grid[0] - grid[1]))
 
 
 def _slerp(start: Array, end: Array, share: Array) -> Array:

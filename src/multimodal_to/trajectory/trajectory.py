@@ -13,12 +13,10 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import LONGEST, InputError, TrajectoryError, listed, shortened, unknown
 from multimodal_to.files.writing import whole
+from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing, text, texts
 from multimodal_to.trajectory.format import ENTRIES, FORMAT_VERSION, FORMATS
 from multimodal_to.trajectory.quantities import QUANTITIES, labels
-
-PAPER_RULE = "backward Euler"
-"""Name of the integration rule that the rates of a trajectory follow."""
 
 _NO_ROTATION = 1e-6
 """A quaternion all of whose parts are smaller cannot be made a unit one."""
@@ -31,8 +29,9 @@ _LABELS = ("joint_names", "contact_names", "jet_names")
 class Trajectory:
     """Every quantity of the optimal control problem at every knot.
 
-    Rates at knot k are those that backward Euler applies over the interval that ends at k. All vectors are in world
-    axes; stacked quantities follow the order of `joint_names`, `contact_names` and `jet_names`.
+    Column k is of knot k or of the interval that ends there, as `rule` says: `trajectory.rules` has the instants. Rates
+    of column k are differences of the columns k and k − 1, divided by Δt. All vectors are in world axes; stacked
+    quantities follow the order of `joint_names`, `contact_names` and `jet_names`.
 
     Raises:
         TrajectoryError: an array has the wrong shape or is not finite, time does not increase, a name stands twice, or
@@ -66,6 +65,7 @@ class Trajectory:
     throttle: Array
 
     scenario_json: str = ""  # the complete scenario, as `scenarios.data` writes it; empty where none is known
+    rule: str = rules.BACKWARD_EULER  # of integration, which says at which instant each quantity is: `trajectory.rules`
     solve_json: str = ""  # how it was solved, as `solving.record` writes it; empty where no solver made it
 
     def __post_init__(self) -> None:
@@ -131,8 +131,8 @@ class Trajectory:
             for key, words in (("own_terms", "terms of its own:"), ("left_out", "left out of the paper's:"))
             if isinstance(names := record.get(key), list) and names
         ]
-        if isinstance(rule := record.get("rule"), str) and rule != PAPER_RULE:
-            parts.append(f"integration by {rule}")
+        if self.rule not in rules.INSTANTS:
+            parts.append(f"integration by {self.rule}")
         return shortened("; ".join(parts), LONGEST)
 
     def labels(self, name: str) -> tuple[str, ...]:
@@ -171,6 +171,7 @@ class Trajectory:
             "scenario": np.array(self.scenario),
             "scenario_json": np.array(self.scenario_json),
             "solve_json": np.array(self.solve_json),
+            "rule": np.array(self.rule),
             "time": self.time,
             "knots": np.array(self.knots),
             "total_time": np.array(self.duration),
@@ -204,7 +205,9 @@ class Trajectory:
         refuse_missing(stored, ("robot", "scenario", "time", *_LABELS, *QUANTITIES), source)
         fields: dict[str, Any] = {name: numbers(stored, name, source) for name in ("time", *QUANTITIES)}
         fields |= {name: texts(stored, name, source) for name in _LABELS}
-        fields |= {name: text(stored, name, source) for name in ("robot", "scenario", "scenario_json", "solve_json")}
+        words = ("robot", "scenario", "scenario_json", "solve_json", "rule")
+        fields |= {name: text(stored, name, source) for name in words}
+        fields["rule"] = fields["rule"] or rules.BACKWARD_EULER  # the one that there was before files said it
         try:
             return cls(**fields)
         except TrajectoryError as error:

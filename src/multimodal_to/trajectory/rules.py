@@ -1,0 +1,39 @@
+"""At which instant each quantity of a trajectory is, by the integration rule of the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+BACKWARD_EULER = "backward Euler"
+STAGGERED = "staggered"
+SAMPLED = "sampled"
+"""Not a rule: every quantity of a column is at the time of its knot, as `resample` returns them."""
+
+OVER_INTERVALS = (
+    "com_velocity",
+    "angular_momentum",
+    "base_linear_velocity",
+    "base_angular_velocity",
+    "joint_velocities",
+    "thrust_rate",
+    "contact_forces",
+    "throttle",
+)
+"""What belongs to an interval under the staggered rule; column k is of the interval that ends at knot k."""
+RATES = ("com_acceleration", "angular_momentum_rate", "thrust_acceleration", "contact_force_rates")
+"""The differences between two intervals: column k lies between the intervals before and after knot k − 1."""
+
+INSTANTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
+    {
+        BACKWARD_EULER: MappingProxyType({}),
+        STAGGERED: MappingProxyType({**dict.fromkeys(OVER_INTERVALS, 0.5), **dict.fromkeys(RATES, 1.0)}),
+        SAMPLED: MappingProxyType({}),
+    }
+)
+"""How far before knot k the quantities of column k are, in intervals; those that are not named are at the knot."""
+
+
+def instant(rule: str, name: str) -> float:
+    """Return how far before its knot a quantity is, in intervals; zero for a rule that this release does not know."""
+    return INSTANTS.get(rule, INSTANTS[BACKWARD_EULER]).get(name, 0.0)
