@@ -1,13 +1,18 @@
-"""Every command, with good and bad input, as a person runs it."""
+"""Every command, with good and bad input, as a person runs it.
+
+Most run in this process. Those whose claim is of a process, or of its imports, run in one of their own.
+"""
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
 import subprocess
 import sys
 import warnings
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,14 +31,30 @@ from synthetic import take_off as synthetic_take_off
 
 
 def run(*arguments, cwd=None, columns=200, **environment):
+    """Run a command in this process, where every warning is an error; what it prints, and its exit status."""
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.setattr(sys, "argv", ["multimodal-to", *map(str, arguments)])
+        patch.setattr(sys.modules["__main__"], "__package__", None)  # else the usage names that of the tests' runner
+        patch.setattr(warnings, "showwarning", warnings.showwarning)  # which `main` replaces
+        for name, value in {"COLUMNS": str(columns), **environment}.items():
+            patch.setenv(name, value)
+        if cwd is not None:
+            patch.chdir(cwd)
+        with pytest.raises(SystemExit) as ended:
+            main()
+    return SimpleNamespace(returncode=ended.value.code, stdout=out.getvalue(), stderr=err.getvalue())
+
+
+def run_process(*arguments, **environment):
+    """Run a command in a process of its own, as `run` says what came of it."""
     return subprocess.run(
         [sys.executable, "-m", "multimodal_to", *map(str, arguments)],
         capture_output=True,
         text=True,
-        cwd=cwd,
         timeout=300,
         check=False,
-        env={**os.environ, "COLUMNS": str(columns), **environment},
+        env={**os.environ, "COLUMNS": "200", **environment},
     )
 
 
@@ -46,7 +67,7 @@ def file(ironcub, tmp_path_factory):
 def stopped(tmp_path_factory):
     """A solve that is given three iterations: too few for an answer."""
     folder = tmp_path_factory.mktemp("stopped") / "new" / "folder"
-    return folder, run("solve", "take-off", "--output", folder, "--max-iterations", 3)
+    return folder, run_process("solve", "take-off", "--output", folder, "--max-iterations", 3)
 
 
 def test_list_shows_the_scenarios_with_their_numbers():
@@ -120,17 +141,8 @@ def test_help_is_short_and_each_command_has_an_example(command):
 def completions(line, folder):
     """What the shell offers for the last word of a line."""
     words = line.split(" ")
-    environment = {"_MULTIMODAL_TO_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
-    code = "import sys; sys.argv = ['multimodal-to']; from multimodal_to.cli import main; main()"
-    result = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        check=False,
-        env={**os.environ, **environment},
-        timeout=60,
-    )
+    asked = {"_MULTIMODAL_TO_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+    result = run(cwd=folder, **asked)
     assert result.stderr == ""
     return result.stdout.split()
 
@@ -167,7 +179,7 @@ def test_robot_info_shows_the_tree_and_what_looks_wrong():
 
 
 def test_version_is_printed():
-    assert run("--version").stdout.startswith("multimodal-to ")
+    assert run_process("--version").stdout.startswith("multimodal-to ")
 
 
 def test_a_solve_writes_trajectory_plot_and_replay_even_without_an_answer(stopped):
@@ -219,7 +231,9 @@ def test_progress_names_iteration_objective_violation_and_time(stopped):
 
 
 def test_quiet_prints_nothing(tmp_path):
-    result = run("solve", "take-off", "--output", tmp_path, "--max-iterations", 1, "--quiet")
+    few = ("--set", "knots=5", "--set", "interval_max=1.0", "--max-iterations", 1)
+    result = run_process("solve", "take-off", *few, "--output", tmp_path, "--quiet")
+    assert len(list(tmp_path.iterdir())) == 3
     assert (result.stdout, result.stderr) == ("", "")
 
 
@@ -260,7 +274,7 @@ def test_files_of_one_scenario_are_told_apart_by_what_differs_in_their_paths():
 
 
 def test_report_and_export_read_a_saved_file(file, tmp_path):
-    assert run("report", file, "--output", tmp_path / "report.html", "--no-meshes").returncode == 0
+    assert run_process("report", file, "--output", tmp_path / "report.html", "--no-meshes").returncode == 0
     assert (tmp_path / "report.html").stat().st_size > 1_000_000
     for kind, name in (("csv", "t.csv"), ("mat", "t.mat"), ("mujoco", "m.npz"), ("pinocchio", "p.npz")):
         assert run("export", file, "--to", kind, "--output", tmp_path / name).returncode == 0
@@ -331,16 +345,11 @@ def test_bare_arrays_are_audited_once_their_robot_is_named(file, tmp_path):
         (("robot", "info", __file__), "is not valid XML"),
     ],
 )
-def test_bad_input_ends_in_one_sentence_and_two(tmp_path, monkeypatch, capsys, arguments, sentence):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", ["multimodal-to", *arguments])
-    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # which `main` replaces
-    with pytest.raises(SystemExit) as ended:
-        main()
-    said = capsys.readouterr().err
-    assert ended.value.code == 2
-    assert said.count("\n") == 1
-    assert sentence in said
+def test_bad_input_ends_in_one_sentence_and_two(tmp_path, arguments, sentence):
+    result = run(*arguments, cwd=tmp_path)
+    assert result.returncode == 2
+    assert result.stderr.count("\n") == 1
+    assert sentence in result.stderr
     assert list(tmp_path.rglob("*.npz")) == []
 
 
@@ -352,8 +361,8 @@ def test_what_no_command_takes_ends_in_usage_and_two(arguments):
 
 
 def test_colour_is_for_terminals_only(file):
-    assert "\x1b" not in run("audit", file).stdout
-    assert "\x1b[1;31mFAILS" in run("audit", file, FORCE_COLOR="1", TERM="xterm-256color").stdout
+    assert "\x1b" not in run_process("audit", file).stdout
+    assert "\x1b[1;31mFAILS" in run_process("audit", file, FORCE_COLOR="1", TERM="xterm-256color").stdout
 
 
 def test_a_folder_that_cannot_be_written_is_found_before_the_solve(tmp_path):
@@ -373,7 +382,7 @@ def test_a_picture_of_an_unknown_kind_is_refused(file, tmp_path):
 
 def test_a_simulation_says_how_far_the_plan_got_and_writes_what_happened(file, tmp_path):
     pytest.importorskip("mujoco")
-    result = run("simulate", file, "--output", tmp_path / "new" / "simulated.npz")
+    result = run_process("simulate", file, "--output", tmp_path / "new" / "simulated.npz")
     assert result.returncode == 1  # a motion made by hand, not by dynamics
     assert "inverse dynamics at 100 random states: MuJoCo and RNEA differ by" in result.stdout
     assert "the robot fell at" in result.stdout
