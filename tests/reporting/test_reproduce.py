@@ -11,6 +11,8 @@ from typer.testing import CliRunner
 import multimodal_to as mt
 from multimodal_to.cli import app, solving
 from multimodal_to.errors import TrajectoryError
+from multimodal_to.plotting import FIGURES
+from multimodal_to.reporting import report, reproduce
 from multimodal_to.reporting.comparison import AUDITS, SOLVES, markdown, table
 from multimodal_to.reporting.published import PUBLISHED
 from multimodal_to.reporting.reproduce import Run, read_published
@@ -107,10 +109,13 @@ def test_the_markdown_has_rows_of_equal_length(run):
 def test_the_command_solves_writes_and_leaves_with_zero_when_all_holds(tmp_path, monkeypatch, bare):
     short = replace(mt.scenarios.take_off(), knots=35, interval_min=0.2, interval_max=0.2)
     monkeypatch.setattr(solving, "find", {"take-off": short}.__getitem__)
+    for module in (report, reproduce):  # two of the figures, which test_report.py has all of
+        monkeypatch.setattr(module, "FIGURES", {name: FIGURES[name] for name in ("forces", "com")})
     arguments = ["reproduce", "take-off", "--output", str(tmp_path), "--published", str(bare)]
     result = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
     assert result.exit_code == 0, result.output
-    assert {"trajectory.npz", "report.html", "forces.png"} <= {path.name for path in tmp_path.glob("take-off/*")}
+    names = {path.name for path in tmp_path.glob("take-off/*")}
+    assert names == {"trajectory.npz", "report.html", "forces.png", "com.png"}
     written = (tmp_path / "table.md").read_text(encoding="utf-8")
     assert "| take-off | optimal |" in written
     assert "| take-off, paper | acceptable | 2976 | 689 |" in written
