@@ -30,10 +30,14 @@ def file(ironcub, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def stopped(tmp_path_factory):
+def stopped(tmp_path_factory, once):
     """A solve that is given three iterations: too few for an answer."""
-    folder = tmp_path_factory.mktemp("stopped") / "new" / "folder"
-    return folder, run_process("solve", "take-off", "--output", folder, "--max-iterations", 3)
+
+    def made():
+        folder = tmp_path_factory.mktemp("stopped") / "new" / "folder"
+        return folder, run_process("solve", "take-off", "--output", folder, "--max-iterations", 3)
+
+    return once("stopped", made)
 
 
 def test_list_shows_the_scenarios_with_their_numbers():
