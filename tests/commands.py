@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from multimodal_to.cli import main
+from multimodal_to.cli.common import out as console
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +35,7 @@ def run(*arguments: object, cwd: Path | None = None, columns: int = 200, **envir
         patch.setattr(warnings, "showwarning", warnings.showwarning)  # which `main` replaces
         for name, value in {"COLUMNS": str(columns), **environment}.items():
             patch.setenv(name, value)
+        patch.setattr(console, "_width", columns)  # it has that of COLUMNS where it was made
         if cwd is not None:
             patch.chdir(cwd)
         with pytest.raises(SystemExit) as ended:
