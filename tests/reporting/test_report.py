@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from commands import run_process
 from multimodal_to import scenarios
 from multimodal_to.auditing.audit import audit
 from multimodal_to.plotting import FIGURES
@@ -23,8 +24,19 @@ def trajectory(ironcub):
 
 
 @pytest.fixture(scope="module")
-def page(ironcub, trajectory, tmp_path_factory):
-    return write_report(ironcub, trajectory, tmp_path_factory.mktemp("report") / "report.html", meshes=False)
+def page(trajectory, tmp_path_factory, once):
+    """The report as the command writes it of a saved file."""
+    folder = tmp_path_factory.mktemp("report")
+
+    def made():
+        file = trajectory.save(folder / "trajectory.npz")
+        ended = run_process("report", file, "--output", folder / "made.html", "--no-meshes")
+        assert (ended.returncode, ended.stderr) == (0, "")
+        return (folder / "made.html").read_text(encoding="utf-8")
+
+    path = folder / "report.html"
+    path.write_text(once("report", made), encoding="utf-8")
+    return path
 
 
 @pytest.fixture
@@ -36,6 +48,7 @@ def one_figure(monkeypatch):
 def test_the_report_says_what_the_audit_says(page, ironcub, trajectory):
     text, judged = page.read_text(encoding="utf-8"), audit(ironcub, trajectory)
     failed = [finding.name for finding in judged.findings if not finding.holds]
+    assert page.stat().st_size > 1_000_000  # the viewer is inside
     assert f"{len(failed)} of {len(judged.findings)} properties fail" in text
     assert text.count('<td class="fails">') == len(failed)
     assert text.count("<figure") == len(FIGURES)
