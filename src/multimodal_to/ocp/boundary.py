@@ -67,9 +67,7 @@ def _set_end(bounds: Bounds, scenario: Scenario, rule: str) -> None:
     if scenario.terminal is Terminal.HOVER:
         for knot in (last - 1, last):
             fix("thrust_rate", knot, 0.0)
-        over_intervals = bool(
-            rules.instant(rule, "contact_forces")
-        )  # then the last two forces meet where the robot rests
-        for knot in (last - 1, last) if over_intervals else (last,):
+        # Forces of intervals: the last two meet at a knot where the robot rests.
+        for knot in (last - 1, last) if rules.instant(rule, "contact_forces") else (last,):
             fix("contact_forces", knot, 0.0, within=_NO_FORCE)
         fix("base_quaternion_xyzw", last, _ORIENTATION, within=_UPRIGHT)
