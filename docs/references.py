@@ -243,7 +243,7 @@ def _places(term: Constraint | Cost, tasks: Mapping[str, Parameters]) -> str:
     text = ", ".join(place.value for place in term.places)
     if term.when is None:
         return text
-    return f"{text}; in {', '.join(name for name, parameters in tasks.items() if term.when(parameters))}"
+    return f"{text}; in {', '.join(name for name, parameters in tasks.items() if term.exists(parameters))}"
 
 
 # ---------------------------------------------------------------- the rooms

@@ -334,6 +334,18 @@ WRONG = {
         lambda: replace(ELBOW, within=mt.between(1.0, 0.0)),
         "the term 'elbow_height': the set is 1 to 0; expected numbers that do not fall",
     ),
+    "a limit that fails": (
+        lambda: replace(ELBOW, within=mt.at_least(lambda parameters: parameters.hight)),
+        "the term 'elbow_height': its set fails: AttributeError: 'Parameters' object has no attribute 'hight'",
+    ),
+    "a condition that fails": (
+        lambda: replace(TURNS, when=lambda parameters: 1 / 0),
+        "the term 'slow_turns': its condition fails: ZeroDivisionError: division by zero",
+    ),
+    "a weight that is no number": (
+        lambda: replace(TURNS, weight=lambda _: "much"),
+        "the term 'slow_turns': the weight is 'much'; expected numbers of at least zero",
+    ),
     "weights of another number": (
         lambda: replace(TURNS, weight=lambda _: np.ones(4)),
         "the term 'slow_turns': there are weights of shape (4,) for 3 rows; expected one for each row",

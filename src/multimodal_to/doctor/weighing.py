@@ -93,7 +93,7 @@ def _sizes(task: Task) -> dict[str, float]:
     parameters = task.parameters
     sizes = {}
     for term in task.formulation.costs:
-        if term.when is None or term.when(parameters):
+        if term.exists(parameters):
             heaviest = float(np.max(term.weights(parameters), initial=0.0))
             if heaviest:
                 sizes[term.name] = heaviest * term.scale**2

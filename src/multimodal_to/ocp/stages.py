@@ -139,7 +139,7 @@ def _rows(constraints: Sequence[Constraint], place: _Place, parameters: Paramete
     """Return the rows of a place by name; a robot without jets has none of theirs."""
     found = []
     for term in constraints:
-        if term.when is None or term.when(parameters):
+        if term.exists(parameters):
             rows = [term.rows(at, parameters) for at in _at(term, place)]
             found += [(term.name, some) for some in rows if some.expression.shape[0]]
     return found
@@ -149,7 +149,7 @@ def _charges(costs: Sequence[Cost], place: _Place, parameters: Parameters, durat
     """Return the weighted costs of a place by name; those of zero weight are left out."""
     charged = {}
     for term in costs:
-        if (term.when is not None and not term.when(parameters)) or not np.any(term.weights(parameters)):
+        if not (term.exists(parameters) and np.any(term.weights(parameters))):
             continue
         for at in _at(term, place):
             amount = term.charge(at, parameters)

@@ -56,10 +56,8 @@ class Within:
 
     def limits(self, parameters: Parameters) -> tuple[float, float]:
         """Return the two numbers."""
-        lower, upper = (
-            float(limit(parameters)) if callable(limit) else float(limit) for limit in (self.lower, self.upper)
-        )
-        return lower, upper
+        lower, upper = (limit(parameters) if callable(limit) else limit for limit in (self.lower, self.upper))
+        return float(lower), float(upper)
 
 
 def equal(value: Limit = 0.0) -> Within:
@@ -138,6 +136,10 @@ class Constraint:
         """Return where the constraint holds."""
         return self.holds if isinstance(self.holds, tuple) else (self.holds,)
 
+    def exists(self, parameters: Parameters) -> bool:
+        """Return whether the problem has the constraint, as `when` says."""
+        return self.when is None or bool(_asked(self.name, "condition", self.when, parameters))
+
     def rows(self, at: Knot | Interval, parameters: Parameters) -> Rows:
         """Return the rows at a knot or over an interval.
 
@@ -146,10 +148,10 @@ class Constraint:
         """
         expression = _evaluated(self.name, self.value, at, parameters)
         count = int(expression.shape[0])
-        lower, upper = self.within.limits(parameters)
+        lower, upper = _asked(self.name, "set", self.within.limits, parameters)
         if not lower <= upper:
             raise _wrong(self.name, f"the set is {lower:g} to {upper:g}", "numbers that do not fall")
-        labels = self.labels(parameters) if callable(self.labels) else self.labels
+        labels = _asked(self.name, "list of labels", self.labels, parameters) if callable(self.labels) else self.labels
         if not labels:
             labels = tuple(str(index) for index in range(1, count + 1)) if count > 1 else ("",) * count
         units = (self.unit,) * count if isinstance(self.unit, str) else self.unit
@@ -204,14 +206,21 @@ class Cost:
         """Return where the cost is charged."""
         return self.charged if isinstance(self.charged, tuple) else (self.charged,)
 
+    def exists(self, parameters: Parameters) -> bool:
+        """Return whether the problem has the cost, as `when` says."""
+        return self.when is None or bool(_asked(self.name, "condition", self.when, parameters))
+
     def weights(self, parameters: Parameters) -> float | Array:
         """Return the weight: one number, or one for each row of the residual.
 
         Raises:
             FormulationError: it is no number of at least zero.
         """
-        weight = self.weight(parameters) if callable(self.weight) else self.weight
-        numbers = np.asarray(weight, dtype=float)
+        weight = _asked(self.name, "weight", self.weight, parameters) if callable(self.weight) else self.weight
+        try:
+            numbers = np.asarray(weight, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise _wrong(self.name, f"the weight is {shown(weight)}", "numbers of at least zero") from error
         if not (np.isfinite(numbers).all() and (numbers >= 0).all()):
             raise _wrong(self.name, f"the weight is {shown(weight)}", "numbers of at least zero")
         return numbers if numbers.ndim else float(numbers)
@@ -257,6 +266,16 @@ def _complete(term: Constraint | Cost, function: Any, place: str) -> None:
     for unit in (term.unit,) if isinstance(term.unit, str) else term.unit:
         if not isinstance(unit, str) or not _UNIT.fullmatch(unit):
             raise _wrong(name, f"the unit is {shown(unit)}", f"one made of {listed(_SYMBOLS)}, as 'm/s²' or 'N m'")
+
+
+def _asked(name: str, what: str, function: Callable[[Parameters], Any], parameters: Parameters) -> Any:
+    """Return what a term's function of the parameters says; a failure names the term and what was asked."""
+    try:
+        return function(parameters)
+    except MultimodalError:
+        raise
+    except Exception as error:  # a user's own function may fail in any way; its own words say how
+        raise FormulationError(f"the term '{name}': its {what} fails: {type(error).__name__}: {error}") from error
 
 
 def _evaluated(name: str, function: Callable[..., SX], at: Knot | Interval, parameters: Parameters) -> SX:
