@@ -250,10 +250,10 @@ def test_thrusts_get_only_what_the_feet_do_not_carry(ironcub, take_off):
     vertical = plan.contact_forces[2::3, 0].sum()
     for carried in (1.0, 0.9, 0.5):
         forces = plan.contact_forces * carried * ironcub.weight / vertical
-        asked[carried] = np.abs(asked_thrusts(ironcub, replace(plan, contact_forces=forces), 0.02)).max()
+        asked[carried] = np.abs(asked_thrusts(ironcub, replace(plan, contact_forces=forces), 0.04)).max()
     assert asked[1.0] < 1e-6 * ironcub.weight
     assert asked[0.9] < 0.5 * asked[0.5]
-    assert asked[0.5] > 0.02 * ironcub.weight
+    assert asked[0.5] > 0.005 * ironcub.weight
 
 
 def test_a_plan_for_other_jets_is_refused(ironcub):

@@ -51,7 +51,7 @@ class Playback:
     thrust: Array  # [N], (steps, jets)
     thrust_rate: Array  # [N/s], (steps, jets)
     throttle: Array  # [%], (steps, jets)
-    torques: Array  # that the joints' motors give, after the clip [N m or N], (steps, n)
+    torques: Array  # that the joints' motors give at a step's start, after the clip [N m or N], (steps, n)
     asked_torques: Array  # that the controller asks of them, before the clip [N m or N], (steps, n)
     torque_limits: bool  # the clip was at `effort_limits`; else there was none
     fell: float | None  # when [s]
