@@ -3,9 +3,10 @@
     python benchmarks/simulation.py [SCENARIO | TRAJECTORY.npz ...] [--trials 0] [--seed 1]
 
 A bundled scenario, by its name, is solved first with default options; a trajectory file is played back as it is. Each
-is played back with the stabiliser, also with a motion that follows its forces by one interval, and without it. Trials
-repeat the playback with the stabiliser's gains and spreads drawn each within ±20 %, and tell how many end as a plan
-should and within what errors: whether the outcome hangs by a thread.
+is played back with the stabiliser and with torques clipped at the joints' effort limits. Then it is played back without
+that clip, with a motion that follows its forces by one interval, and without the stabiliser. Trials repeat the first
+playback with the stabiliser's gains and spreads drawn each within ±20 %, and tell how many end as a plan should and
+within what errors: whether the outcome hangs by a thread.
 """
 
 from __future__ import annotations
@@ -45,10 +46,10 @@ def plan_of(name: str) -> Trajectory:
     return mt.solve(mt.build(mt.load_robot("ironcub"), scenario)).trajectory
 
 
-def playback(plan: Trajectory, *, stabilise: bool = True, delay: float = 0.0) -> Tracking:
+def playback(plan: Trajectory, *, stabilise: bool = True, delay: float = 0.0, torque_limits: bool = True) -> Tracking:
     """Return what comes of a plan."""
     robot = mt.load_robot(plan.robot).with_jets(plan.jet_names)
-    return tracking(play(robot, plan, stabilise=stabilise, delay=delay))
+    return tracking(play(robot, plan, stabilise=stabilise, delay=delay, torque_limits=torque_limits))
 
 
 @contextmanager
@@ -68,14 +69,21 @@ def errors(outcome: Tracking) -> tuple[str, ...]:
     """Return the columns of the table that the stabiliser's playback fills."""
     late = [abs(switch.simulated - switch.planned) for switch in outcome.switches if switch.simulated is not None]
     if outcome.end not in SURVIVES:
-        return "–", "–", "–", "–", ended(outcome)
+        return "–", "–", "–", "–", *torques(outcome), ended(outcome)
     return (
         f"{100 * outcome.com:.1f} cm",
         f"{outcome.attitude:.1f}°",
         f"{outcome.joint:.0f}°",
         f"{max(late, default=0.0):.2f} s",
+        *torques(outcome),
         ended(outcome),
     )
+
+
+def torques(outcome: Tracking) -> tuple[str, str]:
+    """Return the largest asked torque over effort with its joint, and for how long a joint was clipped at most."""
+    largest = outcome.torques[0]
+    return f"{largest.over_effort:.2f} ({largest.joint})", f"{outcome.longest_beyond:.3f} s"
 
 
 def ended(outcome: Tracking) -> str:
@@ -97,7 +105,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="of the other gains")
     options = parser.parse_args()
     console = Console(highlight=False, soft_wrap=True, markup=False)
-    titles = ["plan", "knots", "CoM", "tilt", "joints", "switch", "end", "delay of 1", "without stabiliser"]
+    titles = ["plan", "knots", "CoM", "base", "joints", "switch", "torque / effort", "clipped", "end"]
+    titles += ["without limits", "delay of 1", "without stabiliser"]
     titles += [f"{options.trials} with other gains"] if options.trials else []
     console.print(f"| {' | '.join(titles)} |\n|{' -- |' * len(titles)}")
     for name in options.plans:
@@ -106,6 +115,7 @@ def main() -> None:
             plan.scenario if name.endswith(".npz") else Path(name).stem,
             f"{plan.knots} of {plan.duration / plan.knots:.2f} s",
             *errors(playback(plan)),
+            in_short(playback(plan, torque_limits=False)),
             in_short(playback(plan, delay=1.0)),
             in_short(playback(plan, stabilise=False)),
         ]

@@ -356,7 +356,14 @@ def test_a_simulation_says_how_far_the_plan_got_and_writes_what_happened(file, t
     assert result.returncode == 1  # a motion made by hand, not by dynamics
     assert "inverse dynamics at 100 random states: MuJoCo and RNEA differ by" in result.stdout
     assert "the robot fell at" in result.stdout
+    assert re.search(r"largest torque asked of \w+: \d+ % of its effort limit, at .* s; clipped for", result.stdout)
     assert Trajectory.load(tmp_path / "new" / "simulated.npz").scenario == "take-off & hover in MuJoCo"
+
+
+def test_a_simulation_without_torque_limits_says_that_it_did_not_clip(file, tmp_path):
+    result = run("simulate", file, "--no-torque-limits", "--output", tmp_path / "simulated.npz")
+    assert result.returncode == 1
+    assert "; not clipped, beyond it for" in result.stdout
 
 
 def test_a_simulation_is_written_only_to_a_trajectory_file(file, tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from multimodal_to.models.terrain import FlatGround, Plane, Stairs, frame_functi
 from multimodal_to.simulation import (
     build_model,
     disagreement,
+    effort_limits,
     play,
     random_states,
     simulated_trajectory,
@@ -23,7 +25,7 @@ from multimodal_to.simulation import (
 )
 from multimodal_to.simulation.model import POINT_RADIUS
 from multimodal_to.simulation.reference import reference
-from multimodal_to.simulation.stabiliser import _ridge, _unborne, rotation_vector
+from multimodal_to.simulation.stabiliser import Turbines, _ridge, _unborne, correct, rotation_vector
 from multimodal_to.trajectory.resampling import resample
 from synthetic import take_off as synthetic_take_off
 
@@ -157,6 +159,101 @@ def test_a_short_stand_stays_where_it_is(ironcub, take_off):
     errors = tracking(play(ironcub, short))
     assert errors.com < 0.01
     assert errors.fell is None
+
+
+def standing_half_a_second(take_off):
+    start = take_off.trajectory.time[0]
+    return resample(take_off.trajectory, np.linspace(start, start + 0.5, 11))
+
+
+def with_effort(robot, joint, effort):
+    efforts = robot.joint_limits.effort.copy()
+    efforts[robot.joint_names.index(joint)] = effort
+    return replace(robot, joint_limits=replace(robot.joint_limits, effort=efforts))
+
+
+def test_a_motor_too_weak_for_its_load_lets_its_joint_sag(ironcub, take_off):
+    plan, joint = standing_half_a_second(take_off), "l_knee"
+    index = ironcub.joint_names.index(joint)
+    load = np.abs(reference(ironcub, plan, np.array([0.2, 0.3])).torques[0, index])
+    weak = with_effort(ironcub, joint, 0.3 * load)
+    limited, unlimited = play(weak, plan), play(weak, plan, torque_limits=False)
+    sag, held = (
+        np.degrees(np.abs(one.qpos[:, 7 + index] - one.reference.joints[:, index]).max())
+        for one in (limited, unlimited)
+    )
+    assert held < 1.0
+    assert sag > 5.0
+    assert unlimited.fell is None
+
+
+def test_a_motor_gives_what_is_asked_up_to_its_limit_and_no_more(ironcub, take_off):
+    plan, joint = standing_half_a_second(take_off), "l_hip_roll"
+    index = ironcub.joint_names.index(joint)
+    weak = with_effort(ironcub, joint, 5.0)
+    limited, unlimited = play(weak, plan), play(weak, plan, torque_limits=False)
+    asked, given = limited.asked_torques[:, index], limited.torques[:, index]
+    assert np.abs(asked).max() > 6.0
+    np.testing.assert_allclose(given, np.clip(asked, -5.0, 5.0), atol=1e-9)
+    assert (np.abs(limited.torques) <= effort_limits(weak)).all()
+    np.testing.assert_allclose(unlimited.torques, unlimited.asked_torques, atol=1e-9)
+
+
+def test_the_report_says_what_was_asked_of_each_motor_and_for_how_long_it_was_clipped(ironcub, take_off):
+    weak = with_effort(ironcub, "l_hip_roll", 5.0)
+    playback = play(weak, standing_half_a_second(take_off))
+    outcome = tracking(playback)
+    steps = playback.time.size if playback.fell is None else round(playback.fell / 1e-3) + 1
+    asked = np.abs(playback.asked_torques[:steps, ironcub.joint_names.index("l_hip_roll")])
+    worst = outcome.torques[0]
+    assert worst.joint == "l_hip_roll"
+    assert worst.over_effort == outcome.torque_over_effort == pytest.approx(asked.max() / 5.0)
+    assert worst.when == pytest.approx(playback.time[asked.argmax()])
+    assert worst.beyond == outcome.longest_beyond == pytest.approx(1e-3 * (asked > 5.0).sum())
+    assert outcome.clipped
+    assert {torque.joint for torque in outcome.torques} == set(
+        np.array(ironcub.joint_names)[np.isfinite(effort_limits(ironcub))]
+    )
+
+
+def test_the_take_off_stays_within_its_motors(playback):
+    outcome = tracking(playback)
+    assert 0.1 < outcome.torque_over_effort < 1.0
+    assert outcome.longest_beyond == 0.0
+
+
+@pytest.mark.parametrize("placeholder", [5e4, 0.0, -1.0, np.inf])
+def test_a_placeholder_of_an_effort_limits_nothing(ironcub, placeholder):
+    robot = with_effort(ironcub, "l_knee", placeholder)
+    model = build_model(robot).model
+    assert effort_limits(robot)[robot.joint_names.index("l_knee")] == np.inf
+    assert not model.actuator("l_knee").forcelimited[0]
+    np.testing.assert_array_equal(model.actuator("r_knee").forcerange, [-37.0, 37.0])
+    assert not build_model(robot, torque_limits=False).model.actuator_forcelimited.any()
+
+
+def asked_thrusts(robot, plan, forward):
+    """What the stabiliser asks of the thrusts at the plan's start, with the robot moved forward [m] on its feet."""
+    simulation = build_model(robot, FlatGround())
+    data = mujoco.MjData(simulation.model)
+    start = (plan.base_quaternion_xyzw[:, 0], plan.joint_positions[:, 0], np.zeros(6), np.zeros(len(robot.joint_names)))
+    simulation.set_state(data, plan.base_position[:, 0] + [forward, 0.0, -1e-3], *start)
+    mujoco.mj_forward(simulation.model, data)
+    mujoco.mj_subtreeVel(simulation.model, data)
+    idle = Turbines(thrust=plan.thrust[:, 0], at_most=np.zeros(4, dtype=bool), at_least=np.zeros(4, dtype=bool))
+    wanted = reference(robot, plan, np.array([0.0, 0.1]))
+    return correct(simulation, data, wanted, 0, idle, np.eye(3), robot.friction).thrust
+
+
+def test_thrusts_get_only_what_the_feet_do_not_carry(ironcub, take_off):
+    plan, asked = take_off.trajectory, {}
+    vertical = plan.contact_forces[2::3, 0].sum()
+    for carried in (1.0, 0.9, 0.5):
+        forces = plan.contact_forces * carried * ironcub.weight / vertical
+        asked[carried] = np.abs(asked_thrusts(ironcub, replace(plan, contact_forces=forces), 0.04)).max()
+    assert asked[1.0] < 1e-6 * ironcub.weight
+    assert asked[0.9] < 0.5 * asked[0.5]
+    assert asked[0.5] > 0.005 * ironcub.weight
 
 
 def test_a_plan_for_other_jets_is_refused(ironcub):

@@ -96,6 +96,7 @@ def simulate(
     delay: Annotated[
         float, typer.Option(help="How far the motion follows the forces, from 0 to 1 intervals of the plan.")
     ] = 0.0,
+    torque_limits: Annotated[bool, typer.Option(help="Clip joint torques at the robot's effort limits.")] = True,
     robot: RobotOption = "",
 ) -> None:
     """Play a trajectory back in MuJoCo, say how far it gets, and write what happened as a trajectory.
@@ -115,7 +116,7 @@ def simulate(
         "along the plan": simulation.disagreement(the_robot, simulation.states_along(plan)),
     }
     writable(target.parent)
-    playback = simulation.play(the_robot, plan, stabilise=stabilise, delay=delay)
+    playback = simulation.play(the_robot, plan, stabilise=stabilise, delay=delay, torque_limits=torque_limits)
     outcome = simulation.tracking(playback)
     for where, difference in agreement.items():
         out.print(
@@ -123,10 +124,17 @@ def simulate(
         )
     out.print(
         f"largest errors over {plan.duration:.2f} s: CoM {100 * outcome.com:.1f} cm, base {outcome.attitude:.1f}°, "
-        f"joints {outcome.joint:.1f}° ({outcome.joint_name}), thrust {outcome.thrust:.1f} N; largest torque "
-        f"{100 * outcome.torque_over_effort:.0f} % of its joint's effort limit",
+        f"joints {outcome.joint:.1f}° ({outcome.joint_name}), thrust {outcome.thrust:.1f} N",
         soft_wrap=True,
     )
+    beyond = "clipped" if outcome.clipped else "not clipped, beyond it"
+    for index, torque in enumerate(outcome.torques):
+        if index == 0 or torque.beyond > 0.0:
+            out.print(
+                f"largest torque asked of {torque.joint}: {100 * torque.over_effort:.0f} % of its effort limit, at "
+                f"{torque.when:.2f} s; {beyond} for {torque.beyond:.3f} s",
+                soft_wrap=True,
+            )
     for switch in outcome.switches:
         kind = "touch-down" if switch.touches else "lift-off"
         happened = "never" if switch.simulated is None else f"{switch.simulated - switch.planned:+.2f} s"

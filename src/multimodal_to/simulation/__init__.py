@@ -1,11 +1,12 @@
 """A second opinion: a plan in MuJoCo, which shares no code with the problem that was solved."""
 
 from multimodal_to.simulation.agreement import by_mujoco, by_rnea, disagreement, random_states, states_along
-from multimodal_to.simulation.model import SimulationModel, build_model
+from multimodal_to.simulation.model import SimulationModel, build_model, effort_limits
 from multimodal_to.simulation.playback import Playback, play
-from multimodal_to.simulation.report import Switch, Tracking, simulated_trajectory, tracking
+from multimodal_to.simulation.report import JointTorque, Switch, Tracking, simulated_trajectory, tracking
 
 __all__ = [
+    "JointTorque",
     "Playback",
     "SimulationModel",
     "Switch",
@@ -14,6 +15,7 @@ __all__ = [
     "by_mujoco",
     "by_rnea",
     "disagreement",
+    "effort_limits",
     "play",
     "random_states",
     "simulated_trajectory",

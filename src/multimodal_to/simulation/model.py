@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
 from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.tree import Joint, Link
 from multimodal_to.adam.urdf import read_urdf
@@ -27,7 +28,7 @@ POINT_RADIUS = 2e-3  # of the sphere at a contact point [m]
 CONTACT_TIME = 5e-3
 """Time constant of a contact, critically damped [s]: the softest part of the model."""
 STIFFNESS = 300.0
-"""K of each joint's servo, τ = K (target − s) − D ṡ [N m/rad]."""
+"""K of each joint's servo, τ = K (target − s) − D ṡ, within the effort limit of the joint [N m/rad]."""
 DAMPING = 10.0
 """D of each joint's servo [N m s/rad]; MuJoCo integrates it implicitly."""
 CELL = 0.02  # of the grid on which ground that is no plane is sampled [m]
@@ -90,6 +91,19 @@ class SimulationModel:
         data.qvel[self.joint_velocities] = joint_velocities
 
 
+def effort_limits(robot: Robot) -> Array:
+    """Return the largest torque or force of each joint's motor [N m or N], (n,).
+
+    It is the URDF's effort limit, and infinite where that is a placeholder: `EFFORT_PLACEHOLDER` or more, or not above
+    zero.
+
+    Args:
+        robot: whose motors.
+    """
+    effort = robot.joint_limits.effort
+    return np.where((effort > 0.0) & (effort < EFFORT_PLACEHOLDER), effort, np.inf)
+
+
 def build_model(
     robot: Robot,
     surface: Surface | None = None,
@@ -97,6 +111,7 @@ def build_model(
     *,
     middle: Array | None = None,
     reach: float = 3.0,
+    torque_limits: bool = True,
 ) -> SimulationModel:
     """Return a robot on its ground.
 
@@ -106,6 +121,7 @@ def build_model(
         friction: Coulomb's μ, a round cone; the robot's own by default.
         middle: of the ground that is built where it is no plane [m], (2,); the world's origin by default.
         reach: how far that goes to each side [m].
+        torque_limits: clip what the servo of a joint gives at the joint's `effort_limits`.
 
     Raises:
         OutputError: MuJoCo is not installed.
@@ -137,7 +153,7 @@ def build_model(
         )
     if surface is not None:
         _add_ground(mujoco, spec, surface, mu, np.zeros(2) if middle is None else middle, reach)
-    _add_actuators(mujoco, spec, robot)
+    _add_actuators(mujoco, spec, robot, effort_limits(robot) if torque_limits else None)
     try:
         model = spec.compile()
     except ValueError as error:
@@ -258,9 +274,18 @@ def _add_ground(mujoco: ModuleType, spec: Any, surface: Surface, mu: float, midd
     )
 
 
-def _add_actuators(mujoco: ModuleType, spec: Any, robot: Robot) -> None:
-    """Add a servo at each joint, and at each jet a force along −z of a site that is the jet's frame."""
-    for name in robot.joint_names:
+def _add_actuators(mujoco: ModuleType, spec: Any, robot: Robot, limits: Array | None) -> None:
+    """Add a servo at each joint, and at each jet a force along −z of a site that is the jet's frame.
+
+    Args:
+        mujoco: the package.
+        spec: the model that is being made.
+        robot: with joints and jets.
+        limits: largest torque of each servo, infinite where it has no limit [N m or N], (n,); None limits none.
+    """
+    for index, name in enumerate(robot.joint_names):
+        limit = np.inf if limits is None else float(limits[index])
+        limited = bool(np.isfinite(limit))
         spec.add_actuator(
             name=name,
             trntype=mujoco.mjtTrn.mjTRN_JOINT,
@@ -268,6 +293,8 @@ def _add_actuators(mujoco: ModuleType, spec: Any, robot: Robot) -> None:
             gainprm=[STIFFNESS] + 9 * [0.0],
             biastype=mujoco.mjtBias.mjBIAS_AFFINE,
             biasprm=[0.0, -STIFFNESS, -DAMPING] + 7 * [0.0],
+            forcelimited=limited,
+            forcerange=[-limit, limit] if limited else [0.0, 0.0],
         )
     for jet in robot.jets:
         spec.body(jet.frame).add_site(name=jet.name)

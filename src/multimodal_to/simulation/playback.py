@@ -1,5 +1,7 @@
 """A plan played back in MuJoCo: joint servos with the planned torques, turbines at the planned throttle, a stabiliser.
 
+A joint's motor gives the sum of its servo's torque and the planned one, clipped at the joint's effort limit.
+
 Turbines are integrated from their own dynamics. On top of the planned throttle comes what brings the thrust to the plan
 plus the stabiliser's ΔT: T̈ = T̈* + K_T (T* + ΔT − T) + D_T (Ṫ* − Ṫ), solved for u and kept within its range.
 """
@@ -49,11 +51,15 @@ class Playback:
     thrust: Array  # [N], (steps, jets)
     thrust_rate: Array  # [N/s], (steps, jets)
     throttle: Array  # [%], (steps, jets)
-    torques: Array  # of the servos [N m], (steps, n)
+    torques: Array  # that the joints' motors give at a step's start, after the clip [N m or N], (steps, n)
+    asked_torques: Array  # that the controller asks of them, before the clip [N m or N], (steps, n)
+    torque_limits: bool  # the clip was at `effort_limits`; else there was none
     fell: float | None  # when [s]
 
 
-def play(robot: Robot, plan: Trajectory, *, stabilise: bool = True, delay: float = 0.0) -> Playback:
+def play(
+    robot: Robot, plan: Trajectory, *, stabilise: bool = True, delay: float = 0.0, torque_limits: bool = True
+) -> Playback:
     """Play a plan back on the ground and with the friction of the scenario that it keeps.
 
     Without `stabilise` only the joints' servos close a loop, and turbines get the planned throttle. The motion follows
@@ -64,6 +70,7 @@ def play(robot: Robot, plan: Trajectory, *, stabilise: bool = True, delay: float
         plan: its motion, with the scenario that it was solved for where it keeps one.
         stabilise: let the stabiliser correct thrusts, contact forces and joints.
         delay: of the motion after its forces, from 0 to 1 intervals of the plan.
+        torque_limits: clip the torque of each joint's motor at its `effort_limits`.
 
     Raises:
         OutputError: MuJoCo is not installed.
@@ -82,19 +89,26 @@ def play(robot: Robot, plan: Trajectory, *, stabilise: bool = True, delay: float
         friction,
         middle=(low + high) / 2.0,
         reach=float((high - low).max()) / 2.0 + REACH,
+        torque_limits=torque_limits,
     )
-    return _Player(simulation, plan, friction, stabilise, delay).run()
+    return _Player(simulation, plan, friction, stabilise, delay, torque_limits).run()
 
 
 class _Player:
     """A simulation that runs, with everything that changes as it does."""
 
     def __init__(
-        self, simulation: SimulationModel, plan: Trajectory, friction: float, stabilise: bool, delay: float
+        self,
+        simulation: SimulationModel,
+        plan: Trajectory,
+        friction: float,
+        stabilise: bool,
+        delay: float,
+        torque_limits: bool,
     ) -> None:
         self._mujoco = mujoco_module()
         self._simulation, self._plan, self._robot = simulation, plan, simulation.robot
-        self._friction, self._stabilise = friction, stabilise
+        self._friction, self._stabilise, self._torque_limits = friction, stabilise, torque_limits
         self._data = self._mujoco.MjData(simulation.model)
         self._time: Array = np.asarray(
             TIME_STEP * np.arange(round((plan.duration + HOLD) / TIME_STEP) + 1), dtype=float
@@ -124,7 +138,7 @@ class _Player:
                 self._decide(step)
             rows[-1] |= self._control(step)
             self._mujoco.mj_step2(model, data)
-            rows[-1] |= {"contact_forces": self._contact_forces()}
+            rows[-1] |= {"contact_forces": self._contact_forces(), "torques": self._torques()}
             if self._is_down(step):
                 break
         fell = None if len(rows) == self._time.size else float(self._time[len(rows) - 1])
@@ -135,6 +149,7 @@ class _Player:
             reference=self._reference,
             time=self._time,
             fell=fell,
+            torque_limits=self._torque_limits,
             **{name: np.array([row[name] for row in rows]) for name in rows[0]},
         )
 
@@ -168,7 +183,7 @@ class _Player:
         self._borne = self._borne_by_joints(step)
 
     def _control(self, step: int) -> dict[str, Array]:
-        """Set the servos' targets and the thrusts of this step; return throttles and torques."""
+        """Set the servos' targets and the thrusts of this step; return throttles and asked torques."""
         data, plan = self._data, self._reference
         self._turn_turbines(step, self._correction.thrust)
         self._shift += (self._correction.joints - self._shift) * TIME_STEP / JOINT_LAG
@@ -179,7 +194,7 @@ class _Player:
         data.ctrl[count:] = self._thrust
         servos = STIFFNESS * (data.ctrl[:count] - data.qpos[self._simulation.joint_positions])
         servos -= DAMPING * data.qvel[self._simulation.joint_velocities]
-        return {"throttle": self._throttle.copy(), "torques": servos}
+        return {"throttle": self._throttle.copy(), "asked_torques": servos}
 
     def _turn_turbines(self, step: int, change: Array) -> None:
         """Set the throttles and integrate the thrusts over a step."""
@@ -210,6 +225,10 @@ class _Player:
                 self._mujoco.mj_jacGeom(simulation.model, data, jacobian, None, simulation.points[index])
                 total += jacobian.T @ force
         return np.asarray(total[simulation.joint_velocities])
+
+    def _torques(self) -> Array:
+        """Return what MuJoCo let the joints' motors give, (n,): what was asked, within their limits."""
+        return np.array(self._data.actuator_force[: self._shift.size])
 
     def _contact_forces(self) -> Array:
         """Return the force of the ground on each contact point, (contacts, 3)."""

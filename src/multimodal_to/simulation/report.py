@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.simulation.model import TIME_STEP, effort_limits
 from multimodal_to.simulation.playback import Playback
 from multimodal_to.simulation.stabiliser import rotation_vector
 from multimodal_to.trajectory import Trajectory
@@ -30,6 +31,16 @@ class Switch:
 
 
 @dataclass(frozen=True, kw_only=True)
+class JointTorque:
+    """What was asked of a joint's motor until the end, or until the robot fell."""
+
+    joint: str
+    over_effort: float  # largest asked torque over the effort limit, before the clip [1]
+    when: float  # it was asked, since the start [s]
+    beyond: float  # for how long more than the limit was asked; so long it was clipped, if torques are [s]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Tracking:
     """The largest errors over the plan, and how things stood after its end was held."""
 
@@ -39,11 +50,22 @@ class Tracking:
     joint_name: str
     thrust: float  # [N]
     switches: tuple[Switch, ...]
-    torque_over_effort: float  # largest torque over the URDF's effort limit of its joint [1]
+    torques: tuple[JointTorque, ...]  # of the joints that have an effort limit, the largest over its limit first
+    clipped: bool  # torques were clipped at these limits
     fell: float | None  # when [s]
     end: str  # "fell", "stands", "hovers" or "in the air"
     com_at_end: float  # [m]
     attitude_at_end: float  # [°]
+
+    @property
+    def torque_over_effort(self) -> float:
+        """Return the largest asked torque over the effort limit of its joint [1]; 0 if no joint has a limit."""
+        return max((torque.over_effort for torque in self.torques), default=0.0)
+
+    @property
+    def longest_beyond(self) -> float:
+        """Return for how long the joint that was asked for more than its limit longest was so [s]."""
+        return max((torque.beyond for torque in self.torques), default=0.0)
 
 
 def tracking(playback: Playback) -> Tracking:
@@ -66,12 +88,33 @@ def tracking(playback: Playback) -> Tracking:
         joint_name=robot.joint_names[int(joints.argmax())],
         thrust=float(thrust.max(initial=0.0)),
         switches=_switches(playback),
-        torque_over_effort=float((np.abs(playback.torques).max(axis=0) / robot.joint_limits.effort).max()),
+        torques=_joint_torques(playback),
+        clipped=playback.torque_limits,
         fell=playback.fell,
         end=_end(playback),
         com_at_end=float(com[-1]),
         attitude_at_end=float(attitude[-1]),
     )
+
+
+def _joint_torques(playback: Playback) -> tuple[JointTorque, ...]:
+    """Return what was asked of every joint that has an effort limit; rows after a fall repeat and don't count."""
+    limits = effort_limits(playback.robot)
+    steps = playback.time.size
+    if playback.fell is not None:
+        steps = int(np.searchsorted(playback.time, playback.fell, side="right"))
+    shares = np.abs(playback.asked_torques[:steps]) / limits
+    found = [
+        JointTorque(
+            joint=name,
+            over_effort=float(share.max()),
+            when=float(playback.time[share.argmax()]),
+            beyond=float((share > 1.0).sum() * TIME_STEP),
+        )
+        for name, limit, share in zip(playback.robot.joint_names, limits, shares.T, strict=True)
+        if np.isfinite(limit)
+    ]
+    return tuple(sorted(found, key=lambda torque: -torque.over_effort))
 
 
 def _end(playback: Playback) -> str:

@@ -6,7 +6,9 @@ Wanted is a change of the momentum's rate, with starred the plan and I the robot
 
 Each of three stages takes what the one before leaves, by least squares: z minimises ‖W (A z − Δ)‖² + ‖z / σ‖².
 
-1. Thrusts, which are slow. A jet whose throttle is at its end keeps the thrust that it has.
+1. Thrusts, which are slow. A jet whose throttle is at its end keeps the thrust that it has. They get only what the feet
+   do not carry: σ = σ_T (1 − F / (m g))², with F the planned vertical force on the feet that stand. Else a small error
+   that a stance keeps for seconds would spool up a turbine, which then throws the robot over.
 2. Forces at the contact points that the plan loads, of feet that stand; they stay inside the friction pyramid.
 3. Joints between base and jets, which turn and shift the thrusts. They count the less the more the feet carry.
 
@@ -31,9 +33,9 @@ from multimodal_to.simulation.reference import Reference
 
 COM_STIFFNESS, COM_DAMPING = 6.0, 5.0  # K_x [1/s²], D_x [1/s]
 ATTITUDE_STIFFNESS, ATTITUDE_DAMPING = 16.0, 8.0  # K_R [1/s²], D_h [1/s]
-RADIUS = 0.08  # r: a stance bears half of a moment about an axis from which its points stand so far [m]
+RADIUS = 0.1  # r: a stance bears half of a moment about an axis from which its points stand so far [m]
 LEAN_MAX = 0.05  # [rad]
-THRUST_SPREAD = 20.0  # σ of a thrust [N]
+THRUST_SPREAD = 20.0  # σ_T: of a thrust in flight [N]
 LOAD_SPREAD = 0.5  # σ of a contact force, as a share of the planned load of its point [1]
 JOINT_SPREAD = 0.1  # σ of a joint in flight [rad]
 JOINT_MAX = 0.3  # how far a joint leaves the plan [rad]
@@ -108,7 +110,10 @@ def correct(
     asked = whole.copy()
     if stands:
         asked[3:] = _unborne(points[standing] - origin, loads[standing] / load) @ whole[3:]
-    thrust, missing = _thrusts(simulation, data, asked, origin, turbines, plan.thrust[step], THRUST_WEIGHTS * rows)
+    spread = THRUST_SPREAD * free**2
+    thrust, missing = _thrusts(
+        simulation, data, asked, origin, turbines, plan.thrust[step], spread, THRUST_WEIGHTS * rows
+    )
 
     forces = np.zeros((len(robot.contacts), 3))
     if stands:
@@ -186,6 +191,7 @@ def _thrusts(
     origin: Array,
     turbines: Turbines,
     planned: Array,
+    spread: float,
     weights: Array,
 ) -> tuple[Array, Array]:
     """Return ΔT, and what the thrusts as they are leave of the wanted wrench about `origin`.
@@ -197,15 +203,16 @@ def _thrusts(
         origin: in the world [m], (3,).
         turbines: the jets as they are.
         planned: thrusts of the plan [N], (jets,).
+        spread: σ of each thrust [N].
         weights: W, of forces [1/N] and moments [1/(N m)], (6,).
     """
     axes = _axes(simulation, data)
     wrenches = np.vstack([axes.T, np.cross(data.site_xpos[simulation.jets] - origin, axes).T])
-    off, spread = turbines.thrust - planned, np.full(len(axes), THRUST_SPREAD)
-    change = _ridge(wrenches, wanted, spread, weights)
+    off, spreads = turbines.thrust - planned, np.full(len(axes), spread)
+    change = _ridge(wrenches, wanted, spreads, weights)
     stuck = (turbines.at_most & (change > off)) | (turbines.at_least & (change < off))
     if stuck.any():
-        others = _ridge(wrenches * ~stuck, wanted - wrenches @ (off * stuck), spread, weights)
+        others = _ridge(wrenches * ~stuck, wanted - wrenches @ (off * stuck), spreads, weights)
         change = np.where(stuck, change, others)
     return change, wanted - wrenches @ off
 
