@@ -119,12 +119,18 @@ def test_a_turbine_spools_with_the_order_that_the_rule_says(rule, order, tmp_pat
 # -------------------------------------------------------------------- a motion by the staggered rule
 
 
+TOUCH_DOWN = replace(mt.scenarios.landing(), knots=35, interval_min=0.2, interval_max=0.2)
+
+
 @pytest.fixture(scope="module")
-def touch_down(ironcub):
+def touch_down(ironcub, once):
     """The landing with half its knots, by either rule."""
-    task = replace(mt.scenarios.landing(), knots=35, interval_min=0.2, interval_max=0.2)
-    formulations = (mt.Formulation.paper(), mt.Formulation.staggered())
-    return [mt.solve(mt.build(ironcub, task, formulation)) for formulation in formulations]
+
+    def solved():
+        formulations = (mt.Formulation.paper(), mt.Formulation.staggered())
+        return [mt.solve(mt.build(ironcub, TOUCH_DOWN, formulation)) for formulation in formulations]
+
+    return once("touch-down-by-both-rules", solved)
 
 
 def test_a_staggered_motion_passes_the_audit_by_its_own_instants(ironcub, touch_down):
@@ -174,8 +180,7 @@ def test_other_times_are_read_between_the_instants_of_each_quantity(touch_down):
 
 
 def test_a_solve_starts_from_a_motion_of_the_other_rule(ironcub, touch_down):
-    task = replace(mt.scenarios.landing(), knots=35, interval_min=0.2, interval_max=0.2)
-    problem = mt.build(ironcub, task, mt.Formulation.staggered())
+    problem = mt.build(ironcub, TOUCH_DOWN, mt.Formulation.staggered())
     warm = mt.solve(problem, start=touch_down[0].trajectory)
     assert warm.status is mt.Status.OPTIMAL
     assert warm.iterations < touch_down[1].iterations
