@@ -26,6 +26,11 @@ SHORT = {
 """Knots and range of the time step [s] of the scenarios in the examples' tests: half as many as in earnest, or less."""
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the longest tests first, so that no process is left alone with one of them at the end."""
+    items.sort(key=lambda item: item.path.parent.name != "solving" and item.path.stem != "test_examples")
+
+
 @pytest.fixture(scope="session")
 def ironcub() -> mt.Robot:
     return mt.load_robot("ironcub")
