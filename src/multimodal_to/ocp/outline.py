@@ -59,9 +59,22 @@ def formulate(robot: Robot, scenario: Scenario, standing: Posture, formulation: 
     try:
         set_boundary(bounds, robot, scenario, standing, formulation.rule.name)
     except ScenarioError as error:  # without the terms it fits, as the line before has shown
-        terms = dict.fromkeys(some.term for some in held if str(error).startswith(f"{some.variable}[{some.row}]"))
+        terms = dict.fromkeys(some.term for some in held if _contradicts(some, box, layout))
         raise FormulationError(f"the term '{listed(terms)}' contradicts the start or the end: {error}") from error
     return Outline(layout=layout, bounds=bounds, box=box, stages=stages, held=held)
+
+
+def _contradicts(held: Held, box: Bounds, layout: Layout) -> bool:
+    """Return whether a row that is a bound leaves nothing of its variable's box at some knot.
+
+    Args:
+        held: the row.
+        box: the bounds without terms.
+        layout: of the variables of a knot.
+    """
+    scale = layout.scale[layout.rows[held.variable].start + held.row]
+    lower, upper = (side[held.variable][held.row, held.knots] for side in (box.lower, box.upper))
+    return bool(((upper < held.lower * scale - 1e-9) | (lower > held.upper * scale + 1e-9)).any())
 
 
 def prepared(robot: Robot, scenario: Scenario) -> tuple[Robot, Posture]:

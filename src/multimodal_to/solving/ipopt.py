@@ -176,8 +176,7 @@ def _passes(start: StartPoint) -> tuple[Pass, ...]:
         return Pass.ROUGH, Pass.EXACT
     if start.record.get("feasible") is not False:
         return (Pass.WARM,)
-    before = start.record.get("pass", start.record.get("phase"))  # files of format versions up to 3 say phase
-    return (Pass.ROUGH, Pass.EXACT) if before == Pass.ROUGH.value else (Pass.EXACT,)
+    return (Pass.ROUGH, Pass.EXACT) if start.label == Pass.ROUGH.value else (Pass.EXACT,)
 
 
 @machine.one_blas_thread()

@@ -100,7 +100,7 @@ def solve(
     environment = _environment(problem, solver)
     best = Best(problem, None if checkpoint is None else Checkpoint(checkpoint, environment))
     if point.record is not None:
-        best.seed(point.x, str(point.record.get("pass", point.record.get("phase", ""))))
+        best.seed(point.x, point.label)
     with Interrupts() as interrupts:
         watch = _Watch(problem, best, progress, started, interrupts)
         ending = _run(solver, problem, point, watch)

@@ -22,6 +22,12 @@ class StartPoint:
     record: Mapping[str, Any] | None = None
     """How the motion behind x was solved, as its file says; None where x is the start guess."""
 
+    @property
+    def label(self) -> str:
+        """Return the label of the iterate that the file keeps, as in `Watch`; empty where there is none."""
+        record = self.record or {}
+        return str(record.get("pass", record.get("phase", "")))  # older files say phase
+
 
 class Watch(Protocol):
     """What a solver calls with each iterate; a true answer asks it to stop."""
@@ -43,7 +49,7 @@ class Watch(Protocol):
             rows: g(x) in solver units, where the solver has it at hand.
             objective: f(x), where the solver has it at hand.
             label: what the solver calls the part of its work that the iterate is of; a file keeps it, and a solve that
-                goes on from that file finds it in `StartPoint.record["pass"]`.
+                goes on from that file finds it in `StartPoint.label`.
         """
         ...
 

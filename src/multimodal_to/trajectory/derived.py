@@ -165,7 +165,7 @@ def at_knots(trajectory: Trajectory, name: str) -> Array:
 
 def sampled(trajectory: Trajectory) -> Trajectory:
     """Return the trajectory with every quantity at the instant of its knot, as `at_knots` has it."""
-    if all(not rules.instant(trajectory.rule, name) for name in QUANTITIES):
+    if rules.all_at_knots(trajectory.rule):
         return trajectory
     arrays: dict[str, Any] = {name: at_knots(trajectory, name) for name in QUANTITIES}
     return replace(trajectory, rule=rules.SAMPLED, **arrays)

@@ -26,9 +26,9 @@ def resample(trajectory: Trajectory, times: Array) -> Trajectory:
     wanted, grid = np.asarray(times, dtype=float), trajectory.time
     if wanted.size and not (grid[0] <= wanted.min() and wanted.max() <= grid[-1]):
         raise InputError(f"times from {wanted.min():g} to {wanted.max():g} s; expected {grid[0]:g} to {grid[-1]:g} s")
-    moved = any(rules.instant(trajectory.rule, name) for name in QUANTITIES)
     arrays: dict[str, Any] = {name: _at(trajectory, name, wanted) for name in QUANTITIES}
-    return replace(trajectory, time=wanted, rule=rules.SAMPLED if moved else trajectory.rule, **arrays)
+    rule = trajectory.rule if rules.all_at_knots(trajectory.rule) else rules.SAMPLED
+    return replace(trajectory, time=wanted, rule=rule, **arrays)
 
 
 def regrid(trajectory: Trajectory, knots: int, rule: str) -> Trajectory:

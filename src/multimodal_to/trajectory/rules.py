@@ -34,6 +34,11 @@ INSTANTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
 """How far before knot k the quantities of column k are, in intervals; those that are not named are at the knot."""
 
 
+def all_at_knots(rule: str) -> bool:
+    """Return whether every quantity of a column is at its knot."""
+    return not INSTANTS.get(rule)
+
+
 def instant(rule: str, name: str) -> float:
     """Return how far before its knot a quantity is, in intervals; zero for a rule that this release does not know."""
     return INSTANTS.get(rule, INSTANTS[BACKWARD_EULER]).get(name, 0.0)
