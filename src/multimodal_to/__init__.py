@@ -29,7 +29,7 @@ from multimodal_to.ocp import (
     equal,
     precompile,
 )
-from multimodal_to.scenarios import Scenario, Start, Terminal, Weights
+from multimodal_to.scenarios import Margins, Scenario, Start, Terminal, Weights
 from multimodal_to.scenarios import files as scenario_files
 from multimodal_to.solving import Ending, Ipopt, Solution, Solver, StartPoint, Status, Watch, relax, solve
 from multimodal_to.trajectory import Trajectory
@@ -63,6 +63,7 @@ __all__ = [
     "Terminal",
     "Trajectory",
     "Watch",
+    "Margins",
     "Weights",
     "Where",
     "at_least",

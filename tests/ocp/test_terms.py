@@ -470,7 +470,8 @@ class Midpoint:
     def over(self, quantity, start, end):
         return (quantity(start) + quantity(end)) / 2.0
 
-    driving = over
+    def at_accelerations(self, start, end):
+        return replace(end, thrust=0.5 * (start.thrust + end.thrust))
 
     def at_velocities(self, end, duration):
         return end

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -108,6 +109,16 @@ class Robot:
         contacts = _offsets(self.kindyn, self.home, self.contact_names)
         jets = _offsets(self.kindyn, self.home, [jet.frame for jet in self.jets])
         return proportions.standing_height(contacts, jets)
+
+    @property
+    def speed_unit(self) -> float:
+        """Return √(|g| L) [m/s], the robot's own unit of speed."""
+        return math.sqrt(float(np.linalg.norm(self.gravity)) * self.standing_height)
+
+    @property
+    def rate_unit(self) -> float:
+        """Return √(|g| / L) [1/s], the robot's own unit of rates; a pendulum of its height has this frequency."""
+        return math.sqrt(float(np.linalg.norm(self.gravity)) / self.standing_height)
 
     def with_jets(self, names: Sequence[str]) -> Robot:
         """Return the robot with only the jets of these names, in this order; with none it has none to use.

@@ -75,3 +75,8 @@ def thrust_rate(knot: Knot, parameters: Parameters) -> SX:
 def throttle(knot: Knot, parameters: Parameters) -> SX:
     """u."""
     return knot.throttle
+
+
+def throttle_rate(interval: Interval, parameters: Parameters) -> SX:
+    """u̇ = (u⁺ − u) / Δt."""
+    return interval.rate(lambda knot: knot.throttle)

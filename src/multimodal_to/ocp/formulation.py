@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 from multimodal_to.errors import FormulationError, listed, shown, unknown
-from multimodal_to.ocp import paper
+from multimodal_to.ocp import margins, paper
 from multimodal_to.ocp.integration import BACKWARD_EULER, STAGGERED, IntegrationRule
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.terms import Constraint, Cost, Term
@@ -52,13 +52,15 @@ class Formulation:
         return cls(terms=paper.TERMS)
 
     @classmethod
-    def staggered(cls) -> Formulation:
-        """Return the same problem integrated by the staggered rule, which is of order two.
+    def executable(cls) -> Formulation:
+        """Return the problem whose plans a robot can carry out, which `build` takes by default.
 
-        Contact forces and throttles belong to intervals and velocities to their middles, so a force needs its foot on
-        the ground at both ends of its interval, and the motion is what its forces make of it between the knots as well.
+        Beside the paper's terms it holds the scenario's `Margins`, and it integrates by the staggered rule, of order
+        two: contact forces and throttles belong to intervals and velocities to their middles, so a force needs its foot
+        on the ground at both ends of its interval, and the motion is what its forces make of it between the knots too.
         """
-        return cls(terms=(*paper.TERMS, *paper.STAGGERED), rule=STAGGERED)
+        terms = (margins.FRICTION_CONE if term is paper.FRICTION_CONE else term for term in paper.TERMS)
+        return cls(terms=(*terms, *paper.STAGGERED, *margins.TERMS), rule=STAGGERED)
 
     @property
     def constraints(self) -> tuple[Constraint, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 from multimodal_to.adam import quaternion
@@ -33,11 +34,10 @@ class IntegrationRule(Protocol):
         """
         ...
 
-    def driving(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
-        """Return what a quantity is between the velocities of two knots: an acceleration, which changes velocities.
+    def at_accelerations(self, start: Knot, end: Knot) -> Knot:
+        """Return what acts between the velocities of two knots: configuration, forces and throttles that change them.
 
         Args:
-            quantity: as a function of a knot.
             start: the knot whose velocities are changed.
             end: the knot whose velocities come out.
         """
@@ -69,15 +69,14 @@ class BackwardEuler:
         """
         return quantity(end)
 
-    def driving(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
-        """Return the quantity at the interval's end.
+    def at_accelerations(self, start: Knot, end: Knot) -> Knot:
+        """Return the interval's end.
 
         Args:
-            quantity: as a function of a knot.
             start: the interval's first knot.
             end: the interval's second knot.
         """
-        return quantity(end)
+        return end
 
     def at_velocities(self, end: Knot, duration: SX) -> Knot:
         """Return the knot itself."""
@@ -108,16 +107,15 @@ class Staggered:
         """
         return quantity(end)
 
-    def driving(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
-        """Return the quantity at the interval's start, where two intervals meet, with the mean of what they hold.
+    def at_accelerations(self, start: Knot, end: Knot) -> Knot:
+        """Return the interval's start, where two intervals meet, with the mean of what they hold.
 
         Args:
-            quantity: as a function of a knot.
             start: the knot at which the intervals meet, which holds the first one's velocities and forces.
             end: the knot that holds the second one's.
         """
         means = {name: 0.5 * (getattr(start, name) + getattr(end, name)) for name in rules.OVER_INTERVALS}
-        return quantity(replace(start, **means))
+        return replace(start, **means)
 
     def at_velocities(self, end: Knot, duration: SX) -> Knot:
         """Return the configuration in the middle of the interval: half a step back from its end.
@@ -154,6 +152,11 @@ class Interval:
         """Return the configuration at the instant of the velocities that the interval's end holds."""
         return self.rule.at_velocities(self.end, self.duration)
 
+    @cached_property
+    def at_accelerations(self) -> Knot:
+        """Return the knot at whose instant velocities change, with the velocities, forces and throttles that act there."""
+        return self.rule.at_accelerations(self.start, self.end)
+
     def over(self, quantity: KnotQuantity) -> SX:
         """Return what a quantity of knots, such as a velocity or a contact force, is over the interval."""
         return self.rule.over(quantity, self.start, self.end)
@@ -174,8 +177,7 @@ class Interval:
             quantity: v as a function of a knot, (m, 1).
             rate: a as a function of a knot, (m, 1).
         """
-        acting = self.rule.driving(rate, self.start, self.end)
-        return quantity(self.end) - quantity(self.start) - acting * self.duration
+        return quantity(self.end) - quantity(self.start) - rate(self.at_accelerations) * self.duration
 
     def rotation_gap(self, orientation: KnotQuantity, angular_velocity: KnotQuantity) -> SX:
         """Return ρ⁺ − Exp(ω Δt) ∘ ρ, (4, 1), which is zero where the interval closes (eq. 25b).

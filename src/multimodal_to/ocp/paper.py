@@ -289,6 +289,7 @@ COSTS = (
     _running(costs.thrust, "N", scale=100.0),
     _running(costs.thrust_rate, "N/s", scale=50.0),
     _running(costs.throttle, "%", scale=50.0),
+    _running(costs.throttle_rate, "%/s", Where.EVERY_INTERVAL, scale=50.0),
     _once("initial_posture", costs.posture, "rad", Where.FIRST_KNOT),
     _once("final_posture", costs.posture, "rad"),
     _once("final_com_velocity", costs.com_velocity, "m/s"),

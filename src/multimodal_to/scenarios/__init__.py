@@ -10,13 +10,14 @@ from multimodal_to.scenarios.bundled import (
     take_off_and_landing,
     walk_to_fly,
 )
-from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Weights
+from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
 
 __all__ = [
     "SCENARIOS",
     "Scenario",
     "Start",
     "Terminal",
+    "Margins",
     "Weights",
     "find",
     "jump",

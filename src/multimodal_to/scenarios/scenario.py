@@ -74,6 +74,8 @@ class Weights:
     """Weight of Ṫ [1/(N/s)²]."""
     throttle: float = 0.0
     """Weight of u [1/%²]."""
+    throttle_rate: float = 0.0
+    """Weight of u̇ [1/(%/s)²]."""
     initial_posture: float = 0.0
     """Weight of s − s̄ at the first knot, where it is found [1/rad²]."""
     final_posture: float = 0.0
@@ -94,6 +96,38 @@ class Weights:
                 if not (math.isfinite(number) and number >= 0):
                     raise ScenarioError(f"weight '{entry.name}' is {number}; expected a number of at least zero")
         object.__setattr__(self, "joint_velocities", MappingProxyType(dict(self.joint_velocities)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margins:
+    """How far a plan stays away from the edge of what the robot can do; a margin of zero asks for nothing.
+
+    Speeds are in the robot's own unit √(g L), with L the height of its CoM above its contact points at home.
+    """
+
+    torque: float = 0.9
+    """Greatest torque of a joint, as a share of its effort limit [1]."""
+    friction: float = 0.85
+    """Share of the friction that a plan may use [1]."""
+    pressure: float = 0.75
+    """Size of the sole that a foot's centre of pressure stays in, as a share of the whole sole [1]."""
+    touch_down_speed: float = 0.04
+    """Greatest speed at which a contact point comes to the ground [√(g L)]."""
+    glide_speed: float = 0.01
+    """Greatest speed of a contact point along the ground that it touches [√(g L)]."""
+    distance: float = 0.03
+    """Least distance between links of the robot that are not neighbours [L]."""
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            number = getattr(self, entry.name)
+            if not (math.isfinite(number) and number >= 0):
+                raise ScenarioError(f"margin '{entry.name}' is {number}; expected a number of at least zero")
+
+    @classmethod
+    def none(cls) -> Margins:
+        """Return margins that ask for nothing."""
+        return cls(**{entry.name: 0.0 for entry in fields(cls)})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,6 +162,8 @@ class Scenario:
     """Greatest Δt [s]."""
     weights: Weights
     """The weight of each cost."""
+    margins: Margins = field(default_factory=Margins)
+    """How far the plan stays away from the edge of what the robot can do."""
     surface: Surface = field(default_factory=FlatGround)
     """The ground."""
     friction: float | None = None

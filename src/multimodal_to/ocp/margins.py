@@ -1,0 +1,169 @@
+"""Terms that keep a plan away from the edge of what the robot can do, by the scenario's `Margins`.
+
+Each is a short function of a knot or of an interval; a margin of zero leaves its term out of the problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import casadi as cs
+import numpy as np
+
+from multimodal_to.adam.rnea import inverse_dynamics
+from multimodal_to.adam.spatial import SX, Array
+from multimodal_to.models import contact
+from multimodal_to.models.centroidal import thrust_force
+from multimodal_to.models.robot import Robot
+from multimodal_to.models.sole import soles
+from multimodal_to.ocp import paper
+from multimodal_to.ocp.integration import Interval
+from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.ocp.terms import Constraint, Where, at_least, between
+from multimodal_to.trajectory.quantities import row_labels
+
+GLIDE_RATE = 2.4
+"""κ: how much faster a contact point may move along the ground the higher it is [√(g / L)]."""
+DESCENT_RATE = 1.2
+"""κ: how much faster a contact point may come down the higher it is [√(g / L)]."""
+
+
+def generalised_forces(interval: Interval) -> SX:
+    """Return M ν̇ + C ν + g − Σ Jᵀ f, (6 + n, 1): wrench left for the base [N, N m], then joint torques [N m].
+
+    At the instant at which velocities change: there the accelerations (ν⁺ − ν) / Δt, the forces and the velocities
+    belong together.
+    """
+    knot, tree = interval.at_accelerations, interval.end.robot.kindyn.tree
+    wrenches = {
+        name: cs.vertcat(force, cs.SX(3, 1)) for name, force in zip(knot.robot.contact_names, knot.forces, strict=True)
+    }
+    for index, jet in enumerate(knot.robot.jets):
+        force = thrust_force(knot.pose(jet.frame).rotation, knot.thrust[index])
+        wrenches[jet.frame] = cs.vertcat(force, cs.SX(3, 1))
+    return inverse_dynamics(
+        tree,
+        knot.base,
+        knot.joint_positions,
+        cs.vertcat(knot.base_linear_velocity, knot.base_angular_velocity),
+        knot.joint_velocities,
+        interval.rate(lambda knot: cs.vertcat(knot.base_linear_velocity, knot.base_angular_velocity)),
+        interval.rate(lambda knot: knot.joint_velocities),
+        cs.DM(knot.robot.gravity),
+        wrenches,
+    )
+
+
+def limited_joints(robot: Robot) -> Array:
+    """Return which joints have an effort limit, as their places in s."""
+    effort = robot.joint_limits.effort
+    return np.flatnonzero(np.isfinite(effort) & (effort > 0.0) & (effort < 1e4))
+
+
+def joint_torques(interval: Interval, parameters: Parameters) -> SX:
+    """τ / τ_max of the joints that have an effort limit, by RNEA."""
+    joints = limited_joints(parameters.robot)
+    return generalised_forces(interval)[6 + joints] / cs.DM(parameters.robot.joint_limits.effort[joints])
+
+
+def friction_cone(knot: Knot, parameters: Parameters) -> SX:
+    """|t·f| ≤ η μ n·f as the scenario's pyramid or cone, with the share η of the friction that a plan may use."""
+    share = parameters.scenario.margins.friction or 1.0
+    return paper.FRICTION_CONE.value(knot, replace(parameters, friction=share * parameters.friction))
+
+
+def centre_of_pressure(knot: Knot, parameters: Parameters) -> SX:
+    """Moment of the normal forces about each edge of the sole, shrunk about its middle; over m |g| [m].
+
+    Σ e_⊥ · (r_i − η a) n·f_i with the place r_i of each contact point in the sole, an edge from a along e, and the
+    share η of the sole that a plan may use. None negative where the centre of pressure is inside.
+    """
+    share = parameters.scenario.margins.pressure
+    loads = [
+        contact.normal_force(parameters.surface, point, force) / parameters.robot.weight
+        for point, force in zip(knot.points, knot.forces, strict=True)
+    ]
+    rows = [
+        cs.dot(cs.DM(edge), cs.vertcat(*(loads[index] for index in sole.members)))
+        for sole in soles(parameters.robot)
+        for edge in sole.leverage(share)
+    ]
+    return cs.vertcat(cs.SX(0, 1), *rows)
+
+
+def gliding(interval: Interval, parameters: Parameters) -> SX:
+    """(Δt (v + κ d) ∓ t·Δp) / L: a point that moves along the ground is off it, the higher the faster."""
+    robot = parameters.robot
+    speed, rate = parameters.scenario.margins.glide_speed * robot.speed_unit, GLIDE_RATE * robot.rate_unit
+    rows = []
+    for before, after in zip(interval.start.points, interval.end.points, strict=True):
+        along = parameters.surface.tangents(after).T @ (after - before)
+        height = 0.5 * (parameters.surface.distance(before) + parameters.surface.distance(after))
+        reach = interval.duration * (speed + rate * height)
+        rows += [reach - along, reach + along]
+    return cs.vertcat(*rows) / robot.standing_height
+
+
+def touch_down(interval: Interval, parameters: Parameters) -> SX:
+    """(Δt (v + κ d⁺) − (d − d⁺)) / L: a point comes down the slower the nearer it is to the ground."""
+    robot = parameters.robot
+    speed, rate = parameters.scenario.margins.touch_down_speed * robot.speed_unit, DESCENT_RATE * robot.rate_unit
+    rows = []
+    for before, after in zip(interval.start.points, interval.end.points, strict=True):
+        low = parameters.surface.distance(after)
+        rows.append(interval.duration * (speed + rate * low) - (parameters.surface.distance(before) - low))
+    return cs.vertcat(*rows) / robot.standing_height
+
+
+def _asked(name: str) -> Callable[[Parameters], bool]:
+    return lambda parameters: getattr(parameters.scenario.margins, name) > 0.0
+
+
+def _edges(parameters: Parameters) -> tuple[str, ...]:
+    names = parameters.robot.contact_names
+    return tuple(f"{names[one]} – {names[other]}" for sole in soles(parameters.robot) for one, other in sole.edges)
+
+
+JOINT_TORQUES = Constraint(
+    value=joint_torques,
+    within=between(
+        lambda parameters: -parameters.scenario.margins.torque, lambda parameters: parameters.scenario.margins.torque
+    ),
+    unit="1",
+    holds=Where.EVERY_INTERVAL,
+    labels=lambda parameters: tuple(parameters.robot.joint_names[index] for index in limited_joints(parameters.robot)),
+    when=_asked("torque"),
+)
+FRICTION_CONE = replace(paper.FRICTION_CONE, value=friction_cone)
+CENTRE_OF_PRESSURE = Constraint(
+    value=centre_of_pressure,
+    within=at_least(0.0),
+    unit="m",
+    holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
+    scale=0.01,
+    labels=_edges,
+    when=_asked("pressure"),
+)
+GLIDING = Constraint(
+    value=gliding,
+    within=at_least(0.0),
+    unit="1",
+    holds=Where.EVERY_INTERVAL,
+    scale=0.1,
+    labels=lambda parameters: row_labels(parameters.robot, "contact", ("+x", "+y", "-x", "-y")),
+    when=_asked("glide_speed"),
+)
+TOUCH_DOWN = Constraint(
+    value=touch_down,
+    within=at_least(0.0),
+    unit="1",
+    holds=Where.EVERY_INTERVAL,
+    scale=0.1,
+    labels=lambda parameters: parameters.robot.contact_names,
+    when=_asked("touch_down_speed"),
+)
+
+TERMS = (CENTRE_OF_PRESSURE, GLIDING, TOUCH_DOWN, JOINT_TORQUES)
+"""What a plan that the robot carries out keeps away from, beside the terms of the paper."""
