@@ -15,7 +15,7 @@ for name, cost in sorted(solution.costs.items(), key=lambda item: -item[1])[:5]:
     print(f"  {name:30} {cost:12.0f}")
 
 print("physically true:", mt.audit(robot, trajectory).holds)
-for start, end in flight_phases(trajectory):
+for start, end in flight_phases(robot, trajectory):
     print(f"in the air from {start:.1f} to {end:.1f} s, at most {trajectory.com_position[2].max():.2f} m high")
 
 folder = Path("results/take-off-and-landing")

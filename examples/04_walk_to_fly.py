@@ -22,7 +22,7 @@ for step in footsteps(robot, trajectory, scenario.surface):
         f"{step.lift_off:4.1f} to {step.touch_down:4.1f} s: {step.foot:5} foot, {100 * step.length:.0f} cm far, "
         f"{100 * step.lift:.1f} cm high; the jets carry {100 * share:.0f} % of the weight"
     )
-for start, end in flight_phases(trajectory):
+for start, end in flight_phases(robot, trajectory):
     print(f"{start:4.1f} to {end:4.1f} s: in the air")
 
 folder = Path("results/walk-to-fly")

@@ -21,6 +21,7 @@ from multimodal_to.cli.showing import _labels
 from multimodal_to.models.terrain import Plane
 from multimodal_to.scenarios.data import stored, to_json
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import largest_torques
 from synthetic import take_off as synthetic_take_off
 
 
@@ -56,6 +57,23 @@ def test_a_scenario_is_shown_as_toml_changed_and_read_back(tmp_path):
     (tmp_path / "higher.toml").write_text(shown.stdout)
     again = run("show", tmp_path / "higher.toml", "--set", "name=take-off", "--set", "final_com_height=0.7")
     assert again.stdout == run("show", "take-off").stdout
+
+
+def test_the_torques_of_a_trajectory_are_shown_with_their_limits(ironcub, file):
+    shown = run("show", file, "--torques")
+    assert shown.returncode == 0
+    head, *rows = shown.stdout.splitlines()
+    assert re.split(r"  +", head.strip()) == ["joint", "largest torque [N m]", "at [s]", "effort [N m]", "share"]
+    assert {row.split()[0] for row in rows} == set(ironcub.joint_names)
+    worst = largest_torques(ironcub, Trajectory.load(file))[0]
+    assert rows[0].split()[:2] == [worst.joint, f"{worst.torque:.1f}"]
+    assert {row.split()[3] for row in rows} == {"20", "37", "55.5"}
+
+
+def test_torques_of_a_scenario_are_refused():
+    result = run("show", "take-off", "--torques")
+    assert result.returncode == 2
+    assert "--torques goes with a trajectory file; 'take-off' is no .npz" in result.stderr
 
 
 def test_a_changed_scenario_is_solved_and_kept_in_the_file(tmp_path):

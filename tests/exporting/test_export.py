@@ -9,7 +9,7 @@ import pytest
 from adam_robots import IRONCUB
 from multimodal_to.exporting import export
 from multimodal_to.trajectory import QUANTITIES
-from multimodal_to.trajectory.derived import frame_poses, generalised_forces
+from multimodal_to.trajectory.derived import frame_poses, generalised_forces, joint_torques
 from synthetic import KNOTS, take_off
 
 
@@ -31,12 +31,13 @@ def test_a_table_holds_every_row_under_its_name_with_its_unit(ironcub, trajector
     assert any("world-from-base, x y z w" in line for line in lines if line.startswith("#"))
     rows = list(csv.reader(line for line in lines if not line.startswith("#")))
     assert len(rows) == KNOTS + 2
-    assert len(rows[0]) == 1 + sum(len(getattr(trajectory, name)) for name in QUANTITIES)
+    assert len(rows[0]) == 1 + sum(len(getattr(trajectory, name)) for name in QUANTITIES) + len(ironcub.joint_names)
     values = dict(zip(rows[0], np.array(rows[1:], dtype=float).T, strict=True))
     knee = trajectory.joint_names.index("l_knee")
     np.testing.assert_array_equal(values["joint_positions.l_knee [rad]"], trajectory.joint_positions[knee])
     np.testing.assert_array_equal(values["contact_forces.r_sole_1.z [N]"], trajectory.contact_forces[14])
     np.testing.assert_array_equal(values["thrust.left_arm [N]"], trajectory.thrust[0])
+    np.testing.assert_array_equal(values["joint_torques.l_knee [N m]"], joint_torques(ironcub, trajectory)[knee])
 
 
 def test_a_matlab_file_holds_arrays_names_and_units(ironcub, trajectory, tmp_path):
@@ -45,7 +46,9 @@ def test_a_matlab_file_holds_arrays_names_and_units(ironcub, trajectory, tmp_pat
     for name in QUANTITIES:
         np.testing.assert_array_equal(content[name], getattr(trajectory, name))
     assert tuple(content["joint_names"]) == trajectory.joint_names
+    np.testing.assert_array_equal(content["joint_torques"], joint_torques(ironcub, trajectory))
     assert content["units"]["thrust"] == "N"
+    assert content["units"]["joint_torques"] == "N m"
     assert "backward Euler" in content["conventions"]
 
 

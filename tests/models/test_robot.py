@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import shutil
 
 import numpy as np
@@ -58,6 +59,55 @@ def test_a_robot_is_loaded_from_its_folder(folder, ironcub):
     assert load_robot(folder).joint_names == ironcub.joint_names
 
 
+def set_effort_of_the_urdf(folder, joint, effort):
+    path = folder / "ironcub.urdf"
+    text, count = re.subn(
+        rf'(<joint name="{joint}" type="revolute">(?:(?!</joint>).)*?effort=")[^"]*',
+        rf"\g<1>{effort}",
+        path.read_text(encoding="utf-8"),
+        flags=re.DOTALL,
+    )
+    assert count == 1
+    path.write_text(text, encoding="utf-8")
+
+
+def effort_of(robot, joint):
+    return robot.joint_limits.effort[robot.joint_names.index(joint)]
+
+
+@pytest.mark.parametrize("placeholder", ["50000", "10000", "0", "-1", "1e300"])
+def test_a_placeholder_for_an_effort_limit_in_the_urdf_is_no_limit(folder, placeholder):
+    set_effort_of_the_urdf(folder, "l_knee", placeholder)
+    robot = load_robot(folder)
+    assert effort_of(robot, "l_knee") == np.inf
+    assert effort_of(robot, "r_knee") == 37.0
+
+
+def test_an_effort_limit_is_that_of_robot_toml_and_else_that_of_the_urdf(folder):
+    set_effort_of_the_urdf(folder, "l_knee", "9999")
+    edit(folder, "home = -0.083910097 }", "home = -0.083910097, effort = 12.5 }")
+    robot = load_robot(folder)
+    assert effort_of(robot, "l_knee") == 9999.0
+    assert effort_of(robot, "r_knee") == 12.5
+    edit(folder, "home = 0.379599880, effort = 37.0 }", "home = 0.379599880 }")
+    assert effort_of(load_robot(folder), "torso_pitch") == np.inf  # the URDF has a placeholder
+
+
+def test_every_motor_of_the_ironcub_has_a_limit_and_holds_the_robot_up_by_its_jets(ironcub):
+    """In a hover in the home posture, with the weight on the jets, no joint needs as much as half of its effort."""
+    base, joints = ironcub.home.base_transform, ironcub.home.joint_positions
+    held = np.array(ironcub.kindyn.gravity_term_fun()(base, joints)).ravel()
+    effects = []
+    for jet in ironcub.jets:
+        axis = np.array(ironcub.kindyn.forward_kinematics(jet.frame, base, joints))[:3, 2]
+        effects.append(-np.array(ironcub.kindyn.jacobian_fun(jet.frame)(base, joints))[:3].T @ axis)
+    thrusts, *_ = np.linalg.lstsq(np.array(effects).T[:6], held[:6], rcond=None)
+    torques = held[6:] - (np.array(effects).T @ thrusts)[6:]
+    assert (thrusts > 0.0).all()
+    assert np.isfinite(ironcub.joint_limits.effort).all()
+    assert (np.abs(torques) < 0.5 * ironcub.joint_limits.effort).all()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
@@ -70,6 +120,12 @@ def test_a_robot_is_loaded_from_its_folder(folder, ironcub):
         ("friction = 0.33", "friction = 0.33\nmu = 1", "unknown key 'contact.mu'"),
         ("friction = 0.33", "", "the robot lacks 'contact.friction'"),
         ("speed = 7.0, ", "", "the robot lacks 'joints.torso_pitch.speed'"),
+        (
+            "effort = 37.0",
+            "effort = 0",
+            "'joints.torso_pitch': effort is 0.0; expected a number above 0 and below 10000",
+        ),
+        ("effort = 37.0", "effort = 5e4", "'joints.torso_pitch': effort is 50000.0; expected a number above 0 and"),
         ("speed = 7.0", "speed = 0", "'joints.torso_pitch': speed is 0.0; expected a positive number"),
         ('torso = ["torso_pitch", ', 'torso = ["torso_yaw", ', "joint group 'torso': joint given twice: torso_yaw"),
         ('torso = ["torso_pitch", ', "torso = [3, ", "'joint_groups.torso[0]' is 3; expected a text"),

@@ -16,7 +16,7 @@ from multimodal_to.errors import InputError, OutputError
 from multimodal_to.models.robot import load_robot
 from multimodal_to.plotting import style
 from multimodal_to.scenarios.data import to_json
-from multimodal_to.trajectory import derived
+from multimodal_to.trajectory import derived, rules
 from synthetic import DURATION, LIFT_OFF, take_off
 
 
@@ -102,10 +102,10 @@ def test_a_robot_that_stays_on_the_ground_has_no_band(robot, trajectory):
 
 def test_a_force_just_below_the_threshold_counts_as_flight(robot, trajectory):
     forces = np.zeros_like(trajectory.contact_forces)
-    forces[2] = 0.99 * derived.FLIGHT_FORCE
-    assert derived.flight_phases(replace(trajectory, contact_forces=forces)) == [(0.0, DURATION)]
-    forces[2] = 1.01 * derived.FLIGHT_FORCE
-    assert derived.flight_phases(replace(trajectory, contact_forces=forces)) == []
+    forces[2] = 0.99 * derived.flight_force(robot)
+    assert derived.flight_phases(robot, replace(trajectory, contact_forces=forces)) == [(0.0, DURATION)]
+    forces[2] = 1.01 * derived.flight_force(robot)
+    assert derived.flight_phases(robot, replace(trajectory, contact_forces=forces)) == []
 
 
 def test_limits_and_weight_are_dashed_lines(figure, robot):
@@ -315,3 +315,83 @@ def test_bad_figures_end_in_one_sentence(figure, robot, trajectory, tmp_path):
     with pytest.raises(InputError, match="2 labels"):
         plotting.plot_com(robot, trajectory, labels=["one", "two"])
     assert list(tmp_path.iterdir()) == []
+
+
+# ------------------------------------------------------------------------- each quantity at its own instant
+
+
+@pytest.fixture(scope="module")
+def staggered(trajectory):
+    return replace(trajectory, rule=rules.STAGGERED)
+
+
+def test_a_backward_euler_motion_is_drawn_at_its_knots(robot, trajectory):
+    drawn = [*plotting.plot_com(robot, trajectory).axes, *plotting.plot_forces(robot, trajectory).axes[:2]]
+    for axes in drawn:
+        np.testing.assert_array_equal(axes.lines[0].get_xdata(), trajectory.time)
+        assert axes.lines[0].get_drawstyle() == "default"
+
+
+def test_velocities_of_a_staggered_motion_are_drawn_in_the_middles_of_its_intervals(robot, staggered):
+    middles = (staggered.time[1:] + staggered.time[:-1]) / 2
+    position, velocity = plotting.plot_com(robot, staggered).axes[:2]
+    np.testing.assert_array_equal(position.lines[0].get_xdata(), staggered.time)
+    np.testing.assert_allclose(velocity.lines[0].get_xdata(), middles, atol=1e-12)
+    np.testing.assert_array_equal(velocity.lines[0].get_ydata(), staggered.com_velocity[0, 1:])
+    momentum, rate = plotting.plot_momentum(robot, staggered).axes[:2]
+    np.testing.assert_allclose(momentum.lines[0].get_xdata(), middles, atol=1e-12)
+    np.testing.assert_allclose(rate.lines[0].get_xdata(), staggered.time[:-1], atol=1e-12)
+    speeds = plotting.plot_joints(robot, staggered).axes[-1]
+    np.testing.assert_allclose(speeds.lines[0].get_xdata(), middles, atol=1e-12)
+
+
+def test_forces_and_throttles_of_a_staggered_motion_are_steps_over_its_intervals(robot, staggered):
+    throttle, thrust, force = plotting.plot_forces(robot, staggered).axes
+    load, height = plotting.plot_contacts(robot, staggered).axes[1:]
+    product = plotting.plot_margins(robot, staggered).axes[0]
+    for axes, values in ((throttle, staggered.throttle[0]), (force, staggered.vertical_contact_force())):
+        line = axes.lines[0]
+        np.testing.assert_array_equal(line.get_xdata(), staggered.time)
+        np.testing.assert_array_equal(line.get_ydata()[1:], values[1:])
+    for axes in (throttle, force, load, product):
+        line = axes.lines[0]
+        assert line.get_drawstyle() == "steps-pre"  # column k fills the interval that ends at knot k
+        assert line.get_ydata()[0] == line.get_ydata()[1]
+    for axes in (thrust, height):
+        assert axes.lines[0].get_drawstyle() == "default"
+
+
+def test_bands_of_flight_fill_the_intervals_without_force(robot, staggered):
+    for axes in plotting.plot_forces(robot, staggered).axes:
+        assert bands(axes) == [pytest.approx((LIFT_OFF - DURATION / 20, DURATION))]
+
+
+# ------------------------------------------------------------------------- limits of torques
+
+
+def torque_panel(robot, trajectory, joint):
+    panels = plotting.plot_torques(robot, trajectory).axes
+    (panel,) = (axes for axes in panels if axes.get_title().split(" ")[0] == joint)
+    dashed = {float(line.get_ydata()[0]) for line in panel.lines if line.get_color() == style.LIMIT["color"]}
+    return panel.get_title(), dashed
+
+
+def test_the_effort_limits_of_the_robots_file_are_dashed_where_torques_come_near(robot, trajectory):
+    efforts = robot.joint_limits.effort.copy()
+    row = robot.joint_names.index("l_elbow")
+    assert torque_panel(robot, trajectory, "l_elbow")[0] == "l_elbow (±20)"
+    efforts[row] = np.abs(derived.joint_torques(robot, trajectory)[row, 1:]).max()
+    weak = replace(robot, joint_limits=replace(robot.joint_limits, effort=efforts))
+    assert torque_panel(weak, trajectory, "l_elbow")[1] == {-efforts[row], efforts[row]}
+
+
+def test_a_joint_without_an_effort_limit_has_no_dashed_line(robot, trajectory):
+    efforts = np.full(len(robot.joint_names), np.inf)
+    strong = replace(robot, joint_limits=replace(robot.joint_limits, effort=efforts))
+    assert torque_panel(strong, trajectory, "l_elbow") == ("l_elbow", set())
+
+
+def test_the_last_knot_of_a_staggered_motion_has_no_torque(robot, staggered):
+    drawn = plotting.plot_torques(robot, staggered).axes[0].lines[0].get_ydata()
+    assert np.isnan(drawn[-1])
+    assert np.isfinite(drawn[:-1]).all()

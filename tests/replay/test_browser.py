@@ -152,20 +152,20 @@ def test_bad_times_and_rates_are_refused_before_anything_is_drawn(ironcub, traje
     assert list(tmp_path.iterdir()) == []
 
 
-def test_snapshots_are_taken_where_flight_begins_by_default(trajectory):
-    times = replay.snapshot_times(trajectory)
+def test_snapshots_are_taken_where_flight_begins_by_default(ironcub, trajectory):
+    times = replay.snapshot_times(ironcub, trajectory)
     assert LIFT_OFF in times
     assert times[0] == 0.0
     assert times[-1] == DURATION
 
 
-def test_ghosts_on_a_step_stand_apart(trajectory):
+def test_ghosts_on_a_step_stand_apart(ironcub, trajectory):
     stairs = Stairs(edges=(0.3,), heights=(0.0, 0.1), direction=(-1.0, 0.0))
     kept = to_json(replace(scenarios.take_off(), surface=stairs))
     com = trajectory.com_position.copy()
     com[0] = -0.5 * trajectory.time
     walking = replace(trajectory, scenario_json=kept, com_position=com)
-    np.testing.assert_allclose(replay.snapshot_times(walking), [0.0, 1.0, DURATION])
+    np.testing.assert_allclose(replay.snapshot_times(ironcub, walking), [0.0, 1.0, DURATION])
 
 
 @needs_browser

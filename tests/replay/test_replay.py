@@ -18,7 +18,8 @@ from multimodal_to.models.terrain_mesh import CELL
 from multimodal_to.replay import effects, scene
 from multimodal_to.replay import page as pages
 from multimodal_to.scenarios.data import to_json
-from multimodal_to.trajectory.derived import frame_poses
+from multimodal_to.trajectory import rules
+from multimodal_to.trajectory.derived import flight_force, frame_poses
 from synthetic import DURATION, KNOTS, take_off
 
 quaternion_matrix = scene.meshcat.transformations.quaternion_matrix
@@ -227,7 +228,7 @@ def test_arrows_start_at_the_contact_points_and_point_along_the_forces(robot, tr
             pose, size = stage.world(path, knot), np.linalg.norm(force[:, knot])
             np.testing.assert_allclose(pose[:3, 3], point[:, knot], atol=1e-9)
             length = stage.value(path, "scale", knot)[2]
-            if size > effects.SMALLEST_FORCE:
+            if size > flight_force(robot):
                 np.testing.assert_allclose(pose[:3, 2], force[:, knot] / size, atol=1e-9)
                 assert length == pytest.approx(effects.ARROW_LENGTH * size / robot.weight)
             else:
@@ -237,9 +238,18 @@ def test_arrows_start_at_the_contact_points_and_point_along_the_forces(robot, tr
         assert not any(visible[KNOTS // 2 :])
 
 
+def test_an_arrow_at_a_knot_is_the_mean_of_the_intervals_that_meet_there(robot, trajectory, tmp_path):
+    staggered = replace(trajectory, rule=rules.STAGGERED)
+    shown = Stage(replay.write_html(robot, staggered, tmp_path / "s.html", meshes=False).read_text(encoding="utf-8"))
+    name, force = trajectory.contact_names[0], trajectory.per_contact("contact_forces")[0]
+    for knot in range(5):
+        expected = effects.ARROW_LENGTH * np.linalg.norm(force[:, knot : knot + 2].mean(axis=1)) / robot.weight
+        assert shown.value(shown.find(f"contact_forces/{name}"), "scale", knot)[2] == pytest.approx(expected)
+
+
 def test_an_arrow_can_point_straight_down_or_sideways():
     vectors = np.array([[0.0, 0.0, -50.0], [30.0, 0.0, 0.0], [0.0, -2.0, 0.0], [1e-9, 0.0, -9.0], [0.0, 0.0, 0.0]])
-    for vector, (x, y, z, w) in zip(vectors, scene.turns_from_z(vectors, effects.SMALLEST_FORCE), strict=True):
+    for vector, (x, y, z, w) in zip(vectors, scene.turns_from_z(vectors, 1.0), strict=True):
         direction = quaternion_matrix([w, x, y, z])[:3, 2]
         expected = vector / np.linalg.norm(vector) if vector.any() else [0.0, 0.0, 1.0]
         np.testing.assert_allclose(direction, expected, atol=1e-6)

@@ -15,7 +15,6 @@ from multimodal_to.models.terrain import FlatGround, Plane, Stairs, frame_functi
 from multimodal_to.simulation import (
     build_model,
     disagreement,
-    effort_limits,
     play,
     random_states,
     simulated_trajectory,
@@ -26,7 +25,8 @@ from multimodal_to.simulation import (
 from multimodal_to.simulation.model import POINT_RADIUS
 from multimodal_to.simulation.reference import reference
 from multimodal_to.simulation.stabiliser import Turbines, _ridge, _unborne, correct, rotation_vector
-from multimodal_to.trajectory.resampling import resample
+from multimodal_to.trajectory import rules
+from multimodal_to.trajectory.resampling import regrid, resample
 from synthetic import take_off as synthetic_take_off
 
 mujoco = pytest.importorskip("mujoco")
@@ -126,6 +126,22 @@ def test_what_happened_is_a_trajectory_on_the_grid_of_the_plan(playback, tmp_pat
     motion.save(tmp_path / "simulated.npz")
 
 
+def test_velocities_of_what_happened_are_those_of_the_instants_that_the_rule_of_the_plan_has(playback):
+    """Positions follow from velocities in the middles of intervals to second order, from those at the ends to first."""
+    plan = playback.plan
+    gaps = {}
+    for rule in (rules.BACKWARD_EULER, rules.STAGGERED):
+        motion = simulated_trajectory(replace(playback, plan=regrid(plan, plan.knots, rule)))
+        assert motion.rule == rule
+        moved = np.diff(motion.joint_positions, axis=1)
+        gaps[rule] = np.abs(moved - motion.joint_velocities[:, 1:] * np.diff(plan.time)).max()
+        gaps[rule, "CoM"] = np.abs(
+            np.diff(motion.com_position, axis=1) - motion.com_velocity[:, 1:] * np.diff(plan.time)
+        ).max()
+    assert gaps[rules.STAGGERED] < 0.5 * gaps[rules.BACKWARD_EULER]
+    assert gaps[rules.STAGGERED, "CoM"] < 0.5 * gaps[rules.BACKWARD_EULER, "CoM"]
+
+
 def test_without_a_balance_feedback_the_take_off_tips_and_lies_still(ironcub, take_off):
     playback = play(ironcub, take_off.trajectory, stabilise=False)
     assert tracking(playback).end == "fell"
@@ -195,7 +211,7 @@ def test_a_motor_gives_what_is_asked_up_to_its_limit_and_no_more(ironcub, take_o
     asked, given = limited.asked_torques[:, index], limited.torques[:, index]
     assert np.abs(asked).max() > 6.0
     np.testing.assert_allclose(given, np.clip(asked, -5.0, 5.0), atol=1e-9)
-    assert (np.abs(limited.torques) <= effort_limits(weak)).all()
+    assert (np.abs(limited.torques) <= weak.joint_limits.effort).all()
     np.testing.assert_allclose(unlimited.torques, unlimited.asked_torques, atol=1e-9)
 
 
@@ -211,9 +227,7 @@ def test_the_report_says_what_was_asked_of_each_motor_and_for_how_long_it_was_cl
     assert worst.when == pytest.approx(playback.time[asked.argmax()])
     assert worst.beyond == outcome.longest_beyond == pytest.approx(1e-3 * (asked > 5.0).sum())
     assert outcome.clipped
-    assert {torque.joint for torque in outcome.torques} == set(
-        np.array(ironcub.joint_names)[np.isfinite(effort_limits(ironcub))]
-    )
+    assert {torque.joint for torque in outcome.torques} == set(ironcub.joint_names)
 
 
 def test_the_take_off_stays_within_its_motors(playback):
@@ -222,13 +236,12 @@ def test_the_take_off_stays_within_its_motors(playback):
     assert outcome.longest_beyond == 0.0
 
 
-@pytest.mark.parametrize("placeholder", [5e4, 0.0, -1.0, np.inf])
-def test_a_placeholder_of_an_effort_limits_nothing(ironcub, placeholder):
-    robot = with_effort(ironcub, "l_knee", placeholder)
+def test_a_joint_without_an_effort_limit_is_not_clipped(ironcub):
+    robot = with_effort(ironcub, "l_knee", np.inf)
     model = build_model(robot).model
-    assert effort_limits(robot)[robot.joint_names.index("l_knee")] == np.inf
     assert not model.actuator("l_knee").forcelimited[0]
     np.testing.assert_array_equal(model.actuator("r_knee").forcerange, [-37.0, 37.0])
+    np.testing.assert_array_equal(model.actuator("r_elbow").forcerange, [-20.0, 20.0])
     assert not build_model(robot, torque_limits=False).model.actuator_forcelimited.any()
 
 

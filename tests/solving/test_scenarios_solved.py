@@ -63,7 +63,7 @@ def test_the_thrust_rises_from_step_to_step(ironcub, walk):
 
 def test_the_walk_ends_in_a_hover(ironcub, walk):
     trajectory = walk.trajectory
-    begin, end = flight_phases(trajectory)[-1]
+    begin, end = flight_phases(ironcub, trajectory)[-1]
     assert end == trajectory.duration
     assert end - begin >= 0.3
     assert vertical_thrust(ironcub, trajectory)[-1] == pytest.approx(ironcub.weight, rel=0.01)
@@ -76,12 +76,12 @@ def jump(ironcub, run_example) -> Motion:
     return true_motion(ironcub, run_example("05_jump")[1])
 
 
-def test_the_jump_leaves_the_ground_with_both_feet_and_lands_on_both(jump):
+def test_the_jump_leaves_the_ground_with_both_feet_and_lands_on_both(ironcub, jump):
     trajectory, loads = jump.trajectory, foot_loads(jump)
     assert jump.points[:, :, 2].min(axis=0).max() >= 0.02
     middle, step = trajectory.knots // 2, trajectory.time[1]
     assert trajectory.com_position[2, middle] >= 0.75 - 1e-6
-    (phase,) = flight_phases(trajectory)
+    (phase,) = flight_phases(ironcub, trajectory)
     assert phase[0] < trajectory.time[middle] < phase[1]
     for load in loads.values():
         carried = trajectory.time[load > 50.0]
@@ -100,7 +100,7 @@ def test_take_off_and_landing_are_one_motion(ironcub, run_example):
     motion = true_motion(ironcub, run_example("03_take_off_and_landing")[1])
     trajectory = motion.trajectory
     assert trajectory.com_position[2, trajectory.knots // 2] >= 0.70
-    assert max(end - begin for begin, end in flight_phases(trajectory)) >= 1.0
+    assert max(end - begin for begin, end in flight_phases(ironcub, trajectory)) >= 1.0
     assert spooled_down(stands_on_its_feet(motion))
 
 

@@ -42,8 +42,8 @@ def test_it_ends_at_rest_in_the_air(ironcub, saved):
     assert contact_points(ironcub, saved)[:, -1, 2].min() > 0.05
 
 
-def test_it_flies_once_and_for_at_least_half_a_second(saved):
-    phases = flight_phases(saved)
+def test_it_flies_once_and_for_at_least_half_a_second(ironcub, saved):
+    phases = flight_phases(ironcub, saved)
     assert len(phases) == 1
     assert phases[0][1] - phases[0][0] >= 0.5
     assert phases[0][1] == pytest.approx(saved.duration)

@@ -5,11 +5,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from multimodal_to.adam import KinDynComputations
 from multimodal_to.errors import InputError
 from multimodal_to.models.terrain import FlatGround
-from multimodal_to.trajectory.derived import base_poses, footsteps
+from multimodal_to.trajectory import QUANTITIES, rules
+from multimodal_to.trajectory.derived import (
+    base_poses,
+    contact_products,
+    flight_force,
+    flight_phases,
+    footsteps,
+    generalised_forces,
+    joint_torques,
+    largest_torques,
+    loaded_force,
+    step_length,
+    step_lift,
+)
 from multimodal_to.trajectory.resampling import resample
-from synthetic import DURATION, take_off
+from solo import solo
+from synthetic import DURATION, KNOTS, LIFT_OFF, take_off
 
 
 @pytest.fixture(scope="module")
@@ -84,3 +99,141 @@ def test_how_high_a_foot_lifts_is_seen_from_the_ground_below_it(ironcub, traject
     walk = walking(ironcub, trajectory, lift=0.02, length=0.4)
     (left, _) = footsteps(ironcub, walk, FlatGround(height=-0.5))
     assert left.lift == pytest.approx(0.52, abs=2e-3)
+
+
+# ------------------------------------------------------------------------- what counts, by weight and size
+
+
+def test_what_counts_for_the_ironcub_is_a_few_newtons_and_centimetres(ironcub):
+    assert flight_force(ironcub) == pytest.approx(1.1, abs=0.05)
+    assert loaded_force(ironcub) == pytest.approx(5.0, abs=0.1)
+    assert step_lift(ironcub) == pytest.approx(0.01, abs=2e-4)
+    assert step_length(ironcub) == pytest.approx(0.05, abs=5e-4)
+
+
+def test_what_counts_for_a_small_robot_is_a_small_part_of_what_its_feet_bear(tmp_path):
+    small = solo(tmp_path)
+    share = small.weight / len(small.contacts)
+    assert 0.8 * share < 5.0  # a limit of 5 N would let it skate
+    assert loaded_force(small) < 0.1 * share
+    assert flight_force(small) < loaded_force(small)
+    assert step_lift(small) < 0.005
+    assert step_length(small) < 0.025
+
+
+def test_a_motion_of_half_the_forces_by_half_the_robot_flies_and_steps_alike(ironcub, trajectory):
+    """Under half the gravity all weights are half as much, and so is what counts."""
+    light = light_of(ironcub)
+    walk = walking(ironcub, trajectory, lift=0.02, length=0.4)
+    lighter = replace(walk, contact_forces=0.5 * walk.contact_forces)
+    assert footsteps(light, lighter, FlatGround()) == footsteps(ironcub, walk, FlatGround())
+    slow = replace(trajectory, contact_forces=0.5 * trajectory.contact_forces)
+    assert flight_phases(light, slow) == flight_phases(ironcub, trajectory)
+
+
+def light_of(robot):
+    return replace(robot, kindyn=KinDynComputations(robot.urdf, robot.joint_names, gravity=0.5 * robot.gravity))
+
+
+# ------------------------------------------------------------------------- instants of a staggered motion
+
+
+@pytest.fixture(scope="module")
+def staggered(trajectory):
+    return replace(trajectory, rule=rules.STAGGERED)
+
+
+def test_each_quantity_of_a_staggered_motion_has_its_own_times(trajectory, staggered):
+    time, step = trajectory.time, DURATION / KNOTS
+    for name in ("joint_positions", "thrust"):
+        np.testing.assert_array_equal(staggered.times(name), time)
+    for name in ("joint_velocities", "contact_forces"):
+        np.testing.assert_allclose(staggered.times(name), time - step / 2, atol=1e-12)
+    np.testing.assert_allclose(staggered.times("com_acceleration"), time - step, atol=1e-12)
+    np.testing.assert_array_equal(trajectory.times("com_acceleration"), time)
+    with pytest.raises(InputError, match="unknown quantity 'joint_velocity'; did you mean 'joint_velocities'"):
+        trajectory.times("joint_velocity")
+
+
+def test_a_flight_of_a_staggered_motion_begins_with_the_first_interval_without_force(ironcub, trajectory, staggered):
+    (plain,), (shifted,) = flight_phases(ironcub, trajectory), flight_phases(ironcub, staggered)
+    assert plain == pytest.approx((LIFT_OFF, DURATION))
+    assert shifted == pytest.approx((LIFT_OFF - DURATION / KNOTS, DURATION))
+    nothing = replace(staggered, contact_forces=np.zeros_like(staggered.contact_forces))
+    assert flight_phases(ironcub, nothing) == [(0.0, DURATION)]
+
+
+def test_a_step_of_a_staggered_motion_ends_where_its_loaded_interval_begins(ironcub, trajectory):
+    walk = replace(walking(ironcub, trajectory, lift=0.02, length=0.4), rule=rules.STAGGERED)
+    for step in footsteps(ironcub, walk, FlatGround()):
+        assert (step.lift_off, step.touch_down) == pytest.approx((0.7, 1.2))
+
+
+def test_a_force_of_an_interval_counts_with_the_greater_height_of_its_ends(ironcub, trajectory, staggered):
+    plain, _ = contact_products(ironcub, trajectory, FlatGround())
+    both, _ = contact_products(ironcub, staggered, FlatGround())
+    normal = trajectory.per_contact("contact_forces")[:, 2]
+    heights = np.divide(plain, normal, out=np.zeros_like(plain), where=normal > 0.0)
+    np.testing.assert_allclose(both[:, 1:], normal[:, 1:] * np.maximum(heights[:, 1:], heights[:, :-1]), atol=1e-9)
+
+
+# ------------------------------------------------------------------------- torques
+
+
+def test_joint_torques_give_the_power_that_moves_the_joints(ironcub, trajectory):
+    """Without gravity, contact and thrust, τ ṡ + wᵀ ν is the rate of the kinetic energy ½ νᵀ M ν."""
+    rng = np.random.default_rng(3)
+    free = replace(ironcub, kindyn=KinDynComputations(ironcub.urdf, ironcub.joint_names, gravity=np.zeros(3)))
+    step, count = 1e-4, 41
+    time = step * np.arange(count)
+    rate, acceleration = rng.normal(size=(23, 1)), rng.normal(size=(23, 1))
+    home = ironcub.home
+    still = {name: np.zeros((len(getattr(trajectory, name)), count)) for name in QUANTITIES}
+    still["base_position"] = np.repeat(home.base_position[:, None], count, axis=1)
+    still["base_quaternion_xyzw"] = np.repeat(home.base_quaternion_xyzw[:, None], count, axis=1)
+    middle = time - step / 2
+    still["joint_positions"] = home.joint_positions[:, None] + rate * time + 0.5 * acceleration * time**2
+    still["joint_velocities"] = rate + acceleration * middle
+    motion = replace(trajectory, time=time, rule=rules.STAGGERED, **still)
+    mass = free.kindyn.mass_matrix_fun()
+    energy = []
+    for knot in range(count):
+        speed = np.concatenate([np.zeros(6), (rate + acceleration * time[knot]).ravel()])
+        energy.append(0.5 * speed @ np.array(mass(home.base_transform, motion.joint_positions[:, knot])) @ speed)
+    power = (joint_torques(free, motion) * (rate + acceleration * time)).sum(axis=0)
+    np.testing.assert_allclose(power[1:-1], (np.array(energy)[2:] - np.array(energy)[:-2]) / (2 * step), rtol=1e-5)
+    np.testing.assert_array_equal(joint_torques(free, motion), generalised_forces(free, motion)[6:])
+
+
+@pytest.mark.parametrize(("rule", "knot"), [(rules.BACKWARD_EULER, 0), (rules.STAGGERED, KNOTS)])
+def test_the_torques_of_the_knot_without_an_acceleration_do_not_count(ironcub, trajectory, rule, knot):
+    forces = trajectory.contact_forces.copy()
+    forces[2, knot] += 1e4
+    motion = replace(trajectory, rule=rule, contact_forces=forces)
+    torques = np.abs(joint_torques(ironcub, motion))
+    pushed = ironcub.joint_names.index("l_hip_roll")
+    assert torques[pushed].argmax() == knot
+    found = {one.joint: one for one in largest_torques(ironcub, motion)}["l_hip_roll"]
+    assert found.when != motion.time[knot]
+    assert found.torque == np.delete(torques[pushed], knot).max() < torques[pushed, knot]
+
+
+def test_the_joint_nearest_to_its_limit_comes_first_and_one_without_a_limit_last(ironcub, trajectory):
+    efforts = ironcub.joint_limits.effort.copy()
+    efforts[ironcub.joint_names.index("l_knee")] = np.inf
+    efforts[ironcub.joint_names.index("r_elbow")] = 0.01
+    robot = replace(ironcub, joint_limits=replace(ironcub.joint_limits, effort=efforts))
+    found = largest_torques(robot, trajectory)
+    assert found[0].joint == "r_elbow"
+    assert (found[-1].joint, found[-1].over_effort) == ("l_knee", 0.0)
+    row = np.abs(joint_torques(robot, trajectory)[robot.joint_names.index("r_elbow"), 1:])
+    assert found[0].torque == row.max()
+    assert found[0].when == trajectory.time[1 + row.argmax()]
+    assert {one.joint for one in found} == set(robot.joint_names)
+
+
+def test_a_motion_without_the_jets_of_its_robot_has_torques(ironcub, trajectory):
+    none = np.zeros((0, trajectory.time.size))
+    walker = replace(trajectory, jet_names=(), thrust=none, thrust_rate=none, thrust_acceleration=none, throttle=none)
+    cold = replace(trajectory, thrust=np.zeros_like(trajectory.thrust))
+    np.testing.assert_allclose(joint_torques(ironcub, walker), joint_torques(ironcub, cold), atol=1e-9)

@@ -138,9 +138,14 @@ def _link_findings(link: Link) -> Iterator[str]:
         yield f"has an inertia of {largest:.3g} kg m², far too much for {link.mass:g} kg"
 
 
+def is_placeholder(effort: float) -> bool:
+    """Return whether an effort limit [N m or N] is a number that stands for none: `EFFORT_PLACEHOLDER`, or zero."""
+    return bool(np.isfinite(effort) and (effort >= EFFORT_PLACEHOLDER or effort <= 0))
+
+
 def _joint_findings(joint: Joint, carried_mass: float | None) -> Iterator[str]:
     """Yield what looks wrong about one joint that can move; `carried_mass` [kg] is None if it is locked."""
-    if np.isfinite(joint.effort) and (joint.effort >= EFFORT_PLACEHOLDER or joint.effort <= 0):
+    if is_placeholder(joint.effort):
         yield f"has the effort limit {joint.effort:g}, which looks like a placeholder"
     if np.isfinite(joint.velocity) and (joint.velocity >= VELOCITY_PLACEHOLDER or joint.velocity <= 0):
         yield f"has the velocity limit {joint.velocity:g}, which looks like a placeholder"

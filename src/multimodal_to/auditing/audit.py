@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
 from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Finding, Motion, Worst, largest, worst_of
 from multimodal_to.auditing.properties import GAPS, PROPERTIES, check_allowances
@@ -25,12 +24,12 @@ from multimodal_to.scenarios.data import stored
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory, rules
 from multimodal_to.trajectory.derived import (
-    LOADED,
     at_knots,
     at_velocities,
     base_poses,
     flight_phases,
     generalised_forces,
+    loaded_force,
     surface_frames,
 )
 from multimodal_to.trajectory.sameness import refuse_other_robot
@@ -78,7 +77,7 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
     """
     refuse_other_robot(trajectory, robot)
     scenario = scenario or stored(trajectory)
-    phases = flight_phases(trajectory)
+    phases = flight_phases(robot, trajectory)
     motion = Motion.of(robot, trajectory)
     worst = (
         *_kinematics(motion),
@@ -196,14 +195,10 @@ def _followed(values: Array, trajectory: Trajectory) -> Array:
 
 
 def _torques(motion: Motion) -> list[Worst]:
-    """RNEA along the motion under all contact forces and thrusts: joint torques, and what is left for the base.
-
-    Placeholders of effort limits limit nothing.
-    """
+    """RNEA along the motion under all contact forces and thrusts: joint torques, and what is left for the base."""
     robot = motion.robot
     generalised = _followed(generalised_forces(robot, motion.trajectory), motion.trajectory)
-    effort = np.where(robot.joint_limits.effort < EFFORT_PLACEHOLDER, robot.joint_limits.effort, np.inf)
-    beyond = np.abs(generalised[6:]) - effort[:, None]
+    beyond = np.abs(generalised[6:]) - robot.joint_limits.effort[:, None]
     return [
         worst_of("torque beyond effort", beyond, robot.joint_names),
         worst_of("unexplained base force", largest(generalised[:3])),
@@ -265,7 +260,7 @@ def _contacts(motion: Motion, scenario: Scenario | None) -> list[Worst]:
         worst_of("pulling normal force", -normal, names),
         worst_of("friction beyond cone", reached - friction * normal, names),
         worst_of("normal force × height", normal * raised, names),
-        worst_of("slip under load", np.where(normal > LOADED, slips, 0.0), names),
+        worst_of("slip under load", np.where(normal > loaded_force(motion.robot), slips, 0.0), names),
     ]
 
 

@@ -15,6 +15,7 @@ from multimodal_to.auditing.property import Judged, Property
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.trajectory.derived import LOADED_SHARE
 
 _FEASIBLE = "what a feasible motion may miss its row by"
 _BOUND = "a bound, which the solver holds; the limit is for rounding"
@@ -66,7 +67,7 @@ _PHYSICS = (
         name="torque beyond effort",
         unit="N m",
         limit=1e-3,
-        reason="the URDF's effort limit; the rest is for rounding",
+        reason="the effort limit of `robot.toml`, or the URDF's; the rest is for rounding",
         meaning="torque of a joint by inverse dynamics (RNEA) minus its effort limit; the problem has no row for it",
     ),
     Property(
@@ -170,7 +171,8 @@ _ACTUATION_AND_CONTACT = (
         unit="m",
         limit=1e-3,
         reason="above what the default of `sliding_max` lets a point with 5 N slip: 0.4 mm along each tangent",
-        meaning="way of a contact point along the ground over an interval at whose end it carries more than 5 N",
+        meaning="way of a contact point along the ground over an interval at whose end it carries load: "
+        f"more than {100 * LOADED_SHARE:g} % of the weight over the number of points (iRonCub: 5 N)",
     ),
     Property(
         name="joint range",

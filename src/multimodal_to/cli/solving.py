@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -22,6 +23,7 @@ from multimodal_to.cli.common import (
     app,
     chosen,
     described,
+    loaded,
     out,
     say,
     writable,
@@ -31,7 +33,7 @@ from multimodal_to.cli.progress import Progress
 from multimodal_to.cli.tasks import free_checkpoint, given
 from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
-from multimodal_to.errors import ScenarioError
+from multimodal_to.errors import InputError, ScenarioError
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.ocp import build
 from multimodal_to.ocp import precompile as compile_problem
@@ -43,6 +45,7 @@ from multimodal_to.solving import Ipopt, Relaxation, Solution, relax
 from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import largest_torques
 
 _VIOLATIONS_SHOWN = 5
 
@@ -81,11 +84,20 @@ def show(
         ),
     ],
     settings: Settings = None,
+    torques: Annotated[
+        bool, typer.Option("--torques", help="Print the largest torque of every joint of a trajectory file.")
+    ] = False,
+    robot: RobotOption = "",
 ) -> None:
     """Print a scenario as TOML, complete; also the one that a trajectory file was solved from.
 
+    With --torques it prints what the motion of a trajectory file asks of its joints instead, by inverse dynamics.
+
     Example: multimodal-to show take-off > my_task.toml
     """
+    if torques:
+        _show_torques(Path(name), robot)
+        return
     trajectory = Trajectory.load(name) if name.endswith(".npz") else None
     scenario = chosen(name, None) if trajectory is None else stored(trajectory)
     if scenario is None:
@@ -93,6 +105,19 @@ def show(
     if trajectory is not None and (unusual := trajectory.unusual_formulation()):
         out.print(f"# the problem had {unusual}; a scenario does not hold these", soft_wrap=True)
     out.print(to_toml(change(scenario, settings or ())), soft_wrap=True, end="")
+
+
+def _show_torques(file: Path, robot: str) -> None:
+    """Print the largest torque of every joint, the nearest to its effort limit first."""
+    if file.suffix != ".npz":
+        raise InputError(f"--torques goes with a trajectory file; '{file}' is no .npz")
+    numbers = [Column(title, justify="right") for title in ("largest torque [N m]", "at [s]", "effort [N m]", "share")]
+    table = Table("joint", *numbers, box=None, pad_edge=False)
+    for one in largest_torques(*loaded(file, robot)):
+        limited = math.isfinite(one.effort)
+        limit, share = (f"{one.effort:g}", f"{100 * one.over_effort:.0f} %") if limited else ("none", "")
+        table.add_row(one.joint, f"{one.torque:.1f}", f"{one.when:.2f}", limit, share)
+    out.print(table)
 
 
 @app.command()

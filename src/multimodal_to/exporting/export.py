@@ -14,8 +14,8 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import OutputError
 from multimodal_to.files.writing import whole
 from multimodal_to.models.robot import Robot
-from multimodal_to.trajectory import QUANTITIES, Trajectory, labels
-from multimodal_to.trajectory.derived import base_poses, generalised_forces, sampled
+from multimodal_to.trajectory import QUANTITIES, Trajectory, labels, row_labels
+from multimodal_to.trajectory.derived import JOINT_TORQUES, base_poses, joint_torques, sampled
 
 _NAMES = ("joint_names", "contact_names", "jet_names")
 _RATES = (
@@ -26,17 +26,28 @@ CONVENTIONS = (
     "Time in s. All vectors are in world axes, z up. Quaternions are world-from-base, x y z w.",
     _RATES,
     "Contact forces act on the robot at its contact points; thrusts act along -z of the jets' frames.",
+    "Joint torques follow from the motion by inverse dynamics, at the knots. They have no meaning at the knot whose "
+    "acceleration the motion does not tell: the first of backward Euler, the last of a staggered rule.",
 )
 
 
-def columns(trajectory: Trajectory) -> dict[str, tuple[str, Array]]:
-    """Return every row of every quantity by name, as ``joint_positions.l_knee``, with its unit and values."""
-    trajectory = sampled(trajectory)
+def columns(robot: Robot, trajectory: Trajectory) -> dict[str, tuple[str, Array]]:
+    """Return every row of every quantity by name, as ``joint_positions.l_knee``, with its unit and values.
+
+    The last ones are the joint torques, which follow from the motion.
+
+    Args:
+        robot: the robot of the trajectory, for the torques.
+        trajectory: the motion.
+    """
+    torques, trajectory = joint_torques(robot, trajectory), sampled(trajectory)
     table = {"time": ("s", trajectory.time)}
     for name, quantity in QUANTITIES.items():
         for row, label in enumerate(labels(name, trajectory, separator=".")):
             place = label.replace(" ", "_") if quantity.of == "jet" else label
             table[".".join(filter(None, (name, place)))] = (quantity.unit, getattr(trajectory, name)[row])
+    for joint, values in zip(row_labels(trajectory, JOINT_TORQUES.of, JOINT_TORQUES.axes), torques, strict=True):
+        table[f"joint_torques.{joint}"] = (JOINT_TORQUES.unit, values)
     return table
 
 
@@ -44,11 +55,11 @@ def write_csv(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
     """Write one row for each knot; lines that start with # say the conventions, the first other one names and units.
 
     Args:
-        robot: the robot of the trajectory; not used.
+        robot: the robot of the trajectory, for the torques.
         trajectory: the motion.
         path: of the file, by convention `.csv`.
     """
-    table = columns(trajectory)
+    table = columns(robot, trajectory)
     with whole(path) as draft, draft.open("w", encoding="utf-8", newline="") as stream:
         for line in (f"robot {trajectory.robot}, scenario {trajectory.scenario}", *CONVENTIONS):
             stream.write(f"# {line}\n")
@@ -59,10 +70,12 @@ def write_csv(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
 
 
 def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
-    """Write a MATLAB file (version 5): every quantity, (rows, knots + 1), names as cells, units as a struct.
+    """Write a MATLAB file (version 5): every quantity and the joint torques, (rows, knots + 1), names, units.
+
+    Names are cells; units are a struct.
 
     Args:
-        robot: the robot of the trajectory; not used.
+        robot: the robot of the trajectory, for the torques.
         trajectory: the motion.
         path: of the file, by convention `.mat`.
 
@@ -73,15 +86,16 @@ def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
         from scipy.io import savemat
     except ImportError as error:
         raise OutputError("MATLAB files need SciPy: pip install 'multimodal-to[mat]'") from error
-    trajectory = sampled(trajectory)
+    torques, trajectory = joint_torques(robot, trajectory), sampled(trajectory)
     content = {
         "robot": trajectory.robot,
         "scenario": trajectory.scenario,
         "conventions": "\n".join(CONVENTIONS),
-        "units": {name: quantity.unit for name, quantity in QUANTITIES.items()},
+        "units": {name: quantity.unit for name, quantity in {**QUANTITIES, "joint_torques": JOINT_TORQUES}.items()},
         "time": trajectory.time,
         **{name: np.array(getattr(trajectory, name), dtype=object) for name in _NAMES},
         **{name: getattr(trajectory, name) for name in QUANTITIES},
+        "joint_torques": torques,
     }
     with whole(path) as draft:
         savemat(draft, content, oned_as="row", long_field_names=True)
@@ -99,7 +113,7 @@ def write_mujoco(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[s
         trajectory: the motion.
         path: of the file, by convention `.npz`.
     """
-    torques, trajectory = generalised_forces(robot, trajectory)[6:], sampled(trajectory)
+    torques, trajectory = joint_torques(robot, trajectory), sampled(trajectory)
     parts = {
         "qpos": [trajectory.base_position, _unit_quaternions(trajectory)[[3, 0, 1, 2]], trajectory.joint_positions],
         "qvel": [
@@ -133,7 +147,7 @@ def write_pinocchio(robot: Robot, trajectory: Trajectory, path: str | os.PathLik
         trajectory: the motion.
         path: of the file, by convention `.npz`.
     """
-    torques, trajectory = generalised_forces(robot, trajectory)[6:], sampled(trajectory)
+    torques, trajectory = joint_torques(robot, trajectory), sampled(trajectory)
     parts = {
         "q": [trajectory.base_position, _unit_quaternions(trajectory), trajectory.joint_positions],
         "v": [

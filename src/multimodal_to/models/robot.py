@@ -15,6 +15,7 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam import KinDynComputations, quaternion
+from multimodal_to.adam.inspection import is_placeholder
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
 from multimodal_to.files.reading import read_toml
@@ -23,7 +24,7 @@ from multimodal_to.models import proportions
 from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import Jet
 from multimodal_to.models.proportions import Gait
-from multimodal_to.models.robot_keys import RobotFile
+from multimodal_to.models.robot_keys import JointTable, RobotFile
 
 ROBOT_FILE = "robot.toml"
 _RECORDS = Records(what="the robot", error=ModelError)
@@ -53,7 +54,7 @@ class JointLimits:
     lower: Array  # [rad or m]
     upper: Array  # [rad or m]
     speed: Array  # [rad/s or m/s]
-    effort: Array  # [N m or N], as the URDF states it
+    effort: Array  # [N m or N]; inf where none is known
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -220,8 +221,22 @@ def _limits(file: RobotFile, kindyn: KinDynComputations) -> JointLimits:
         lower=np.array([joint.lower for joint in joints]),
         upper=np.array([joint.upper for joint in joints]),
         speed=np.array([joint.speed for joint in joints]),
-        effort=np.array([joint.effort for joint in kindyn.tree.joints]),
+        effort=np.array(
+            [_effort(joint, stated.effort) for joint, stated in zip(joints, kindyn.tree.joints, strict=True)]
+        ),
     )
+
+
+def _effort(joint: JointTable, stated: float) -> float:
+    """Return the effort limit of a joint [N m or N]; inf where none is known.
+
+    Args:
+        joint: its table in `robot.toml`, which may state one.
+        stated: what the URDF states [N m or N]; a placeholder counts as nothing.
+    """
+    if joint.effort is not None:
+        return joint.effort
+    return np.inf if is_placeholder(stated) else stated
 
 
 def _home(file: RobotFile) -> Posture:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER, is_placeholder
 from multimodal_to.errors import InputError, shown
 from multimodal_to.files.keys import Key, keys_of
 from multimodal_to.models.jet import JetModel
@@ -27,11 +28,16 @@ class JointTable:
     """Greatest speed to plan with, either way [rad/s or m/s]."""
     home: float
     """Position in the home posture [rad or m]."""
+    effort: float | None = None
+    """Greatest torque or force to plan with, either way [N m or N]. Where there is none, it is the URDF's. There, a
+    placeholder (10 000 or more, or 0 or less) is no limit."""
 
     def __post_init__(self) -> None:
         if not self.lower <= self.home <= self.upper:
             raise InputError(f"home {self.home} is not within its range {self.lower} to {self.upper}")
         _positive("speed", self.speed)
+        if self.effort is not None and is_placeholder(self.effort):
+            raise InputError(f"effort is {self.effort}; expected a number above 0 and below {EFFORT_PLACEHOLDER:g}")
 
 
 @dataclass(frozen=True, kw_only=True)

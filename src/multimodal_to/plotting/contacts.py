@@ -15,13 +15,14 @@ from multimodal_to.plotting.style import (
     Run,
     draw_flight,
     draw_limits,
+    draw_row,
     finish,
     legend_above,
     new_figure,
     runs_of,
 )
 from multimodal_to.trajectory import Trajectory
-from multimodal_to.trajectory.derived import FLIGHT_FORCE
+from multimodal_to.trajectory.derived import flight_force
 
 _BAR = 0.8  # of the height that a contact point has in the timeline
 
@@ -29,7 +30,7 @@ _BAR = 0.8  # of the height that a contact point has in the timeline
 def plot_contacts(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Plot a timeline of the contact points by foot, and each foot's vertical force [N] and least height [mm].
 
-    A bar spans the intervals over which a point's vertical force is above `derived.FLIGHT_FORCE`: the force at a knot
+    A bar spans the intervals over which a point's vertical force is above `derived.flight_force`: the force at a knot
     acts over the interval that ends there. Several runs stand below each other in the timeline.
 
     Raises:
@@ -46,8 +47,9 @@ def plot_contacts(robot: Robot, *trajectories: Trajectory, labels: Sequence[str]
         for foot, colour in zip(feet, COLOURS, strict=False):
             members = [index for index, contact in enumerate(run.robot.contacts) if contact.foot == foot]
             label = f"{foot} foot" if number == 0 else None
-            force.plot(run.time, forces[members].sum(axis=0), color=colour, linestyle=run.style, label=label)
-            height.plot(run.time, 1e3 * heights[members].min(axis=0), color=colour, linestyle=run.style)
+            look = {"color": colour, "linestyle": run.style}
+            draw_row(force, run, forces[members].sum(axis=0), "contact_forces", label=label, **look)
+            draw_row(height, run, 1e3 * heights[members].min(axis=0), "contact_positions", **look)
     draw_limits(force, {robot.weight}, "weight")
     force.set_ylabel("vertical force [N]")
     height.set_ylabel("least height [mm]")
@@ -62,10 +64,10 @@ def plot_contacts(robot: Robot, *trajectories: Trajectory, labels: Sequence[str]
 def _draw_timeline(axes: Axes, runs: Sequence[Run], feet: Sequence[str]) -> None:
     names: list[str] = []
     for run in runs:
-        loaded = run.trajectory.per_contact("contact_forces")[:, 2] > FLIGHT_FORCE
+        loaded = run.trajectory.per_contact("contact_forces")[:, 2] > flight_force(run.robot)
         for contact, row in zip(run.robot.contacts, loaded, strict=True):
             colour = COLOURS[feet.index(contact.foot) % len(COLOURS)]
-            spans = [(start, end - start) for start, end in _spans(run.time, row)]
+            spans = [(start, end - start) for start, end in _spans(run.trajectory.time, row)]
             axes.broken_barh(spans, (len(names) - _BAR / 2, _BAR), facecolors=colour)
             names.append(contact.frame if len(runs) == 1 else f"{contact.frame}, {run.label}")
     axes.set_yticks(range(len(names)), names, fontsize="x-small")

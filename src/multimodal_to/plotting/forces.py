@@ -14,6 +14,7 @@ from multimodal_to.plotting.style import (
     draw_flight,
     draw_limits,
     draw_lines,
+    draw_row,
     finish,
     legend_above,
     new_figure,
@@ -26,7 +27,7 @@ from multimodal_to.trajectory.derived import vertical_thrust
 def plot_forces(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Plot throttle [%], thrust [N] and total vertical contact force [N] over time, one panel each.
 
-    Flight (`derived.FLIGHT_FORCE`) is a translucent red band; limits are dashed; beside the contact force stand the
+    Flight (`derived.flight_force`) is a translucent red band; limits are dashed; beside the contact force stand the
     weight m g and the vertical sum of the thrusts, which takes it over from the ground. Legends stand above the panels.
 
     Raises:
@@ -38,10 +39,10 @@ def plot_forces(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
     jets = list(dict.fromkeys(jet for run in runs for jet in run.robot.jets))
     names = max((run.trajectory.jet_names for run in runs), key=len)
 
-    draw_lines(throttle, runs, [run.trajectory.throttle for run in runs], names)
+    draw_lines(throttle, runs, [run.trajectory.throttle for run in runs], "throttle", names)
     draw_limits(throttle, {limit for jet in jets for limit in (jet.throttle_min, jet.throttle_max)}, "limits")
     throttle.set_ylabel("throttle [%]")
-    draw_lines(thrust, runs, [run.trajectory.thrust for run in runs], names)
+    draw_lines(thrust, runs, [run.trajectory.thrust for run in runs], "thrust", names)
     draw_limits(thrust, {jet.thrust_max for jet in jets}, "maximum")
     thrust.set_ylabel("thrust [N]")
     _draw_vertical(force, runs)
@@ -60,8 +61,8 @@ def plot_forces(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
 
 def _draw_vertical(axes: Axes, runs: Sequence[Run]) -> None:
     for index, run in enumerate(runs):
-        for values, colour, label in (
-            (run.trajectory.vertical_contact_force(), "black", "contact force"),
-            (vertical_thrust(run.robot, run.trajectory), COLOURS[1], "vertical thrust"),
+        for values, of, colour, label in (
+            (run.trajectory.vertical_contact_force(), "contact_forces", "black", "contact force"),
+            (vertical_thrust(run.robot, run.trajectory), "thrust", COLOURS[1], "vertical thrust"),
         ):
-            axes.plot(run.time, values, color=colour, linestyle=run.style, label=label if index == 0 else None)
+            draw_row(axes, run, values, of, color=colour, linestyle=run.style, label=label if index == 0 else None)

@@ -8,22 +8,21 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
-from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.plotting.style import (
     SMALL,
     Run,
+    blank,
     draw_flight,
     draw_limits,
     draw_lines,
     finish,
     new_figure,
-    pad,
     runs_of,
 )
 from multimodal_to.trajectory import Trajectory
-from multimodal_to.trajectory.derived import generalised_forces
+from multimodal_to.trajectory.derived import joint_torques
 
 _COLUMNS = 6
 _CELL = (2.15, 1.55)  # [inch]
@@ -46,6 +45,7 @@ def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
         upper,
         runs,
         [run.trajectory.joint_positions for run in runs],
+        "joint_positions",
         "position [rad]",
         limits.lower,
         limits.upper,
@@ -56,9 +56,9 @@ def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
 
 
 def plot_torques(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
-    """Plot every joint's torque [N m] (`derived.generalised_forces`) and, dashed, the effort limits of the URDF.
+    """Plot every joint's torque [N m] (`derived.joint_torques`) and, dashed, its effort limit.
 
-    The first knot, whose forces and velocities enter no dynamics, is left out; placeholders limit nothing.
+    The knot whose acceleration the trajectory does not tell, the first or the last, is left out.
 
     Raises:
         InputError: the trajectories are for different robots, or too many.
@@ -66,9 +66,9 @@ def plot_torques(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] 
     runs = runs_of(robot, trajectories, labels)
     rows = -(-len(robot.joint_names) // _COLUMNS)
     figure = new_figure(runs, "joint torques", (_COLUMNS * _CELL[0], (rows + 0.2) * _CELL[1]))
-    effort = np.where(robot.joint_limits.effort < EFFORT_PLACEHOLDER, robot.joint_limits.effort, np.nan)
-    values = [pad(generalised_forces(run.robot, run.trajectory)[6:]) for run in runs]
-    _cells(figure, runs, values, "torque [N m]", -effort, effort, whole_range=False)
+    effort = robot.joint_limits.effort
+    values = [blank(joint_torques(run.robot, run.trajectory), run.trajectory) for run in runs]
+    _cells(figure, runs, values, "joint_positions", "torque [N m]", -effort, effort, whole_range=False)
     return figure
 
 
@@ -76,18 +76,20 @@ def _cells(
     figure: Figure | SubFigure,
     runs: Sequence[Run],
     values: Sequence[Array],
+    of: str,
     unit: str,
     lower: Array,
     upper: Array,
     *,
     whole_range: bool,
 ) -> None:
-    """Draw one small panel for each joint; NaN limits are none.
+    """Draw one small panel for each joint; limits that are not finite are none.
 
     Args:
         figure: an empty one.
         runs: to draw.
         values: of each run, (n, knots + 1), a row for each joint.
+        of: name of the quantity whose instants the columns have.
         unit: title and unit of the values.
         lower: limit of each joint, in the unit of the values, (n,).
         upper: limit of each joint, in the unit of the values, (n,).
@@ -100,7 +102,7 @@ def _cells(
         if index >= len(names):
             axes.set_axis_off()
             continue
-        draw_lines(axes, runs, [rows_of_run[index : index + 1] for rows_of_run in values], ())
+        draw_lines(axes, runs, [rows_of_run[index : index + 1] for rows_of_run in values], of, ())
         ends = [end for end in (float(lower[index]), float(upper[index])) if np.isfinite(end)]
         largest = max(float(np.nanmax(np.abs(rows_of_run[index]))) for rows_of_run in values)
         if whole_range or (ends and largest > 0.3 * ends[-1]):
@@ -121,7 +123,7 @@ def _speeds(figure: SubFigure, robot: Robot, runs: Sequence[Run]) -> None:
     panels = figure.subplots(1, len(groups), sharex=True, squeeze=False)[0]
     for axes, (name, members) in zip(panels, groups.items(), strict=True):
         rows = [robot.joint_names.index(member) for member in members]
-        draw_lines(axes, runs, [run.trajectory.joint_velocities[rows] for run in runs], members)
+        draw_lines(axes, runs, [run.trajectory.joint_velocities[rows] for run in runs], "joint_velocities", members)
         limit = float(robot.joint_limits.speed[rows].min())
         largest = max(float(np.abs(run.trajectory.joint_velocities[rows]).max()) for run in runs)
         if largest > 0.3 * limit:

@@ -20,6 +20,7 @@ from multimodal_to.plotting.style import (
     Run,
     draw_flight,
     draw_limits,
+    draw_row,
     legend_above,
     new_figure,
     runs_of,
@@ -68,9 +69,11 @@ def _draw_products(axes: Axes, runs: Sequence[Run]) -> None:
         labels = ("height × normal force", "slip × normal force")
         for product, colour, label in zip(products, COLOURS, labels, strict=False):
             largest = product.max(axis=0, initial=0.0)
-            axes.semilogy(
-                run.time,
+            draw_row(
+                axes,
+                run,
                 np.maximum(largest, _PRODUCT_FLOOR),
+                "contact_forces",
                 color=colour,
                 linestyle=run.style,
                 label=label if number == 0 else None,
@@ -82,6 +85,7 @@ def _draw_products(axes: Axes, runs: Sequence[Run]) -> None:
         for bound in (scenario.complementarity_max, math.sqrt(2.0) * scenario.sliding_max)
     ]
     draw_limits(axes, set(bounds), "bounds")
+    axes.set_yscale("log")
     axes.set_ylim(_PRODUCT_FLOOR, max(1e-3, 3.0 * axes.get_ylim()[1]))
     axes.set_ylabel("largest product [N m]")
     axes.set_xlabel("time [s]")

@@ -48,7 +48,7 @@ def _components(runs: Sequence[Run], what: str, columns: Sequence[tuple[str, str
     for column, (name, title, least) in enumerate(columns):
         for row, axis in enumerate("xyz"):
             axes = grid[row, column]
-            draw_lines(axes, runs, [getattr(run.trajectory, name)[row : row + 1] for run in runs], ())
+            draw_lines(axes, runs, [getattr(run.trajectory, name)[row : row + 1] for run in runs], name, ())
             axes.set_ylabel(f"{title} {axis} [{QUANTITIES[name].unit}]")
             draw_flight([axes], runs, labelled=grid[0, 0])
             finish([axes], least)

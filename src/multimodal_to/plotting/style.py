@@ -17,8 +17,8 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError, OutputError
 from multimodal_to.files.writing import whole
 from multimodal_to.models.robot import Robot
-from multimodal_to.trajectory import Trajectory
-from multimodal_to.trajectory.derived import flight_phases
+from multimodal_to.trajectory import Trajectory, rules
+from multimodal_to.trajectory.derived import flight_phases, without_acceleration
 from multimodal_to.trajectory.sameness import refuse_other_robot
 
 SUFFIXES = (".png", ".svg", ".pdf")
@@ -42,11 +42,6 @@ class Run:
     trajectory: Trajectory
     label: str
     style: Any
-
-    @property
-    def time(self) -> Array:
-        """Return the knots [s]."""
-        return self.trajectory.time
 
 
 def runs_of(robot: Robot, trajectories: Sequence[Trajectory], labels: Sequence[str] | None) -> list[Run]:
@@ -93,22 +88,46 @@ def new_figure(runs: Sequence[Run], what: str, size: tuple[float, float]) -> Fig
     return figure
 
 
-def draw_lines(axes: Axes, runs: Sequence[Run], values: Iterable[Array], names: Iterable[str]) -> None:
+def draw_row(axes: Axes, run: Run, values: Array, of: str, **look: Any) -> None:
+    """Draw one row over time, at the instants of the quantity that it belongs to.
+
+    What is constant over intervals is drawn as steps. What is before the first knot is left out.
+
+    Args:
+        axes: to draw in.
+        run: whose times.
+        values: of the columns, (knots + 1,).
+        of: name of the quantity whose instants the columns have.
+        **look: of the line, as `Axes.plot` takes it.
+    """
+    trajectory = run.trajectory
+    if rules.held(trajectory.rule, of):
+        axes.plot(trajectory.time, [values[1], *values[1:]], drawstyle="steps-pre", **look)
+        return
+    times = trajectory.times(of)
+    within = times >= trajectory.time[0]
+    axes.plot(times[within], values[within], **look)
+
+
+def draw_lines(axes: Axes, runs: Sequence[Run], values: Iterable[Array], of: str, names: Iterable[str]) -> None:
     """Draw rows (rows, knots + 1) of each run: the colour tells the row, the style the run or, of one run, the row.
 
     Args:
         axes: to draw in.
         runs: whose times and styles.
         values: of each run, (rows, knots + 1).
+        of: name of the quantity whose instants the columns have.
         names: of the rows in the legend; rows beyond them have no entry.
     """
     labels = list(names)
     for number, (run, rows) in enumerate(zip(runs, values, strict=True)):
         for index, row in enumerate(rows):
             style = run.style if len(runs) > 1 else STYLES[index % len(STYLES)] if len(rows) <= len(STYLES) else "-"
-            axes.plot(
-                run.time,
+            draw_row(
+                axes,
+                run,
                 row,
+                of,
                 color=COLOURS[index % len(COLOURS)],
                 linestyle=style,
                 label=labels[index] if number == 0 and index < len(labels) else None,
@@ -135,7 +154,7 @@ def draw_flight(all_axes: Iterable[Axes], runs: Sequence[Run], labelled: Axes | 
         runs: whose flight.
         labelled: the one of them with an entry in its legend.
     """
-    phases = [phase for run in runs for phase in flight_phases(run.trajectory)]
+    phases = [phase for run in runs for phase in flight_phases(run.robot, run.trajectory)]
     look = FLIGHT | {"alpha": FLIGHT["alpha"] * min(1.0, 2.0 / len(runs))}  # bands that lie over each other add up
     for axes in all_axes:
         for index, (start, end) in enumerate(phases):
@@ -178,6 +197,13 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def pad(values: Array) -> Array:
-    """Return an array with a NaN in place of its first column: for what has no meaning at the first knot."""
-    return np.column_stack([np.full(values.shape[0], np.nan), values[:, 1:]])
+def blank(values: Array, trajectory: Trajectory) -> Array:
+    """Return values of the knots with NaN at the one whose acceleration the trajectory does not tell.
+
+    Args:
+        values: that depend on accelerations, (rows, knots + 1).
+        trajectory: the motion.
+    """
+    known = values.copy()
+    known[:, without_acceleration(trajectory)] = np.nan
+    return known

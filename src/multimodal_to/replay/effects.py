@@ -11,15 +11,13 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.scene import Y_TO_Z, Scene, SmoothMesh, shapes, translation, turns_from_z
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import at_knots, flight_force
 
 FLAME_LENGTH = 0.45
 """Length of the flame of the robot's strongest jet at its greatest thrust; others in proportion to their thrust [m]."""
 
 ARROW_LENGTH = 1.5
 """Length of the arrow of a contact force as large as the robot's weight [m]."""
-
-SMALLEST_FORCE = 1.0
-"""Contact forces below this have no arrow [N]."""
 
 _NOZZLE_RADIUS = 0.033  # of the flame of the strongest jet [m]
 _FULL_WIDTH_LENGTH = 0.08  # arrows and flames shorter than this are also thinner [m]
@@ -68,7 +66,9 @@ def draw_flames(
 
 
 def draw_contact_forces(scene: Scene, robot: Robot, trajectory: Trajectory, root: str = "contact_forces") -> None:
-    """Draw each contact force as an arrow that starts at its contact point.
+    """Draw each contact force at the instants of the knots as an arrow that starts at its contact point.
+
+    A force below `flight_force` has none.
 
     Args:
         scene: where to draw.
@@ -77,15 +77,16 @@ def draw_contact_forces(scene: Scene, robot: Robot, trajectory: Trajectory, root
         root: path in the scene that all arrows are below.
     """
     colour = shapes.MeshLambertMaterial(color=0x1FA34A, emissive=0x08401B)
-    positions, forces = trajectory.per_contact("contact_positions"), trajectory.per_contact("contact_forces")
+    positions, smallest = trajectory.per_contact("contact_positions"), flight_force(robot)
+    forces = at_knots(trajectory, "contact_forces").reshape(positions.shape)
     for name, position, force in zip(trajectory.contact_names, positions, forces, strict=True):
         path, size = f"{root}/{name}", np.linalg.norm(force, axis=0)
         shaft, tip = shapes.Cylinder(0.75, radius=0.006), shapes.Cylinder(0.25, radiusTop=0.0, radiusBottom=0.015)
         scene.add(f"{path}/shaft", shaft, colour, translation([0.0, 0.0, 0.375]) @ Y_TO_Z)
         scene.add(f"{path}/tip", tip, colour, translation([0.0, 0.0, 0.875]) @ Y_TO_Z)
         scene.set(path, "position", position.T)
-        scene.set(path, "quaternion", turns_from_z(force.T, SMALLEST_FORCE))
-        _stretch(scene, path, ARROW_LENGTH * np.where(size < SMALLEST_FORCE, 0.0, size) / robot.weight)
+        scene.set(path, "quaternion", turns_from_z(force.T, smallest))
+        _stretch(scene, path, ARROW_LENGTH * np.where(size < smallest, 0.0, size) / robot.weight)
 
 
 def draw_com(scene: Scene, trajectory: Trajectory) -> None:

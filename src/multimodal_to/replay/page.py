@@ -91,7 +91,7 @@ def write_still_html(
     """
     recorder, look = Recorder(), appearance(robot.urdf, meshes=meshes)
     picture = draw_still(meshcat.Visualizer(window=recorder), robot, trajectory, times, look, aspect)
-    return write_text(path, _page(trajectory, _player(trajectory, recorder, picture, look.attribution)))
+    return write_text(path, _page(trajectory, _player(robot, trajectory, recorder, picture, look.attribution)))
 
 
 def player(robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = None, meshes: bool = True) -> str:
@@ -105,7 +105,7 @@ def player(robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = N
     """
     recorder, look = Recorder(), appearance(robot.urdf, meshes=meshes)
     picture = draw_motion(meshcat.Visualizer(window=recorder), robot, trajectory, look, ghost=ghost)
-    return _player(trajectory, recorder, picture, look.attribution, ghost)
+    return _player(robot, trajectory, recorder, picture, look.attribution, ghost)
 
 
 def _page(trajectory: Trajectory, content: str) -> str:
@@ -113,9 +113,14 @@ def _page(trajectory: Trajectory, content: str) -> str:
 
 
 def _player(
-    trajectory: Trajectory, recorder: Recorder, picture: Picture, attribution: str, ghost: Trajectory | None = None
+    robot: Robot,
+    trajectory: Trajectory,
+    recorder: Recorder,
+    picture: Picture,
+    attribution: str,
+    ghost: Trajectory | None = None,
 ) -> str:
-    phases = [] if picture.still or not trajectory.contact_names else flight_phases(trajectory)
+    phases = [] if picture.still or not trajectory.contact_names else flight_phases(robot, trajectory)
     shown = {_FLAME: trajectory.jet_names, _ARROW: trajectory.contact_names, _COM: not picture.still, _FLIGHT: phases}
     keys = [
         f'<div><span class="key" style="background: {colour}"></span>{text}</div>'

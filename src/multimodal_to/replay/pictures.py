@@ -147,7 +147,7 @@ def write_snapshots(
         InputError: a time is not within the trajectory, or times do not increase.
         OutputError: there is no browser, or the file cannot be written.
     """
-    instants = snapshot_times(trajectory) if times is None else np.array(list(times), dtype=float)
+    instants = snapshot_times(robot, trajectory) if times is None else np.array(list(times), dtype=float)
     width, height = size or (max(SNAPSHOT_SIZE[0] * instants.size, SNAPSHOT_SIZE[1]), SNAPSHOT_SIZE[1])
     with tempfile.TemporaryDirectory() as folder, whole(path) as draft:
         page = Path(folder) / "still.html"
@@ -159,13 +159,17 @@ def write_snapshots(
     return Path(path)
 
 
-def snapshot_times(trajectory: Trajectory) -> Array:
+def snapshot_times(robot: Robot, trajectory: Trajectory) -> Array:
     """Return times [s] that tell a motion: start and end, and those where flight begins or ends, or even ones.
 
     They are five; on ground that is not flat, where ghosts stand where they were, only those that leave room between.
+
+    Args:
+        robot: whose weight tells flight.
+        trajectory: its motion.
     """
     start, end = float(trajectory.time[0]), float(trajectory.time[-1])
-    edges = [edge for phase in flight_phases(trajectory) for edge in phase if start < edge < end]
+    edges = [edge for phase in flight_phases(robot, trajectory) for edge in phase if start < edge < end]
     times = np.linspace(start, end, 5)
     if len(edges) == 1:
         times = np.array([start, (start + edges[0]) / 2, edges[0], (edges[0] + end) / 2, end])

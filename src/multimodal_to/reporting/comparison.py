@@ -112,15 +112,15 @@ AUDITS = (
     _worst("unexplained base force [N]", "unexplained base force", ".1f"),
     Column(title="verdict", of_run=_verdict),
 )
-"""What the audit of the motion says; a torque beyond effort that is negative is so far within the legs' limits."""
+"""What the audit of the motion says; a torque beyond effort that is negative is so far within the joints' limits."""
 
 _SOLVES_NOTE = """\
-*In all* is the time to build, solve and audit. A step is a foot that lifts at least 1 cm and lands at least 5 cm away.
+*In all* is the time to build, solve and audit. A step of the iRonCub lifts at least 1 cm and lands at least 5 cm away.
 Thrust over weight is vertical: ours at the end, the paper's in flight. The paper's rows are its published figures and
 an audit of its published data. They are not runs on this machine."""
 
 _AUDITS_NOTE = """\
-Torque beyond effort is that of the legs by inverse dynamics; a negative one is within their limits. The unexplained
+Torque beyond effort is that of all joints by inverse dynamics; a negative one is within their limits. The unexplained
 base force is the force that inverse dynamics asks for at the base, where nothing pushes."""
 
 

@@ -13,6 +13,8 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+import numpy as np
+
 from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.auditing.findings import Finding
 from multimodal_to.files.writing import write_text
@@ -22,6 +24,7 @@ from multimodal_to.replay import player
 from multimodal_to.scenarios.files import to_toml
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.derived import largest_torques
 
 PACKAGES = ("multimodal-to", "casadi", "numpy")
 """Whose versions the report names as those that drew it."""
@@ -81,12 +84,15 @@ def _summary(report: Audit) -> str:
 
 def _facts(robot: Robot, trajectory: Trajectory, report: Audit) -> dict[str, str]:
     versions = [f"{name} {metadata.version(name)}" for name in PACKAGES]
+    torque = largest_torques(robot, trajectory)[0]
+    share = f", {100 * torque.over_effort:.0f} % of its effort limit" if np.isfinite(torque.effort) else ""
     status, took = (_solve_facts(trajectory.solve_record())[name] for name in ("status", "time in the solver"))
     return {
         "scenario": trajectory.scenario,
         "robot": f"{robot.name}: {len(robot.joint_names)} joints, {robot.mass:.2f} kg, "
         f"{len(robot.contacts)} contact points, {len(robot.jets)} jets",
         "time": f"{report.duration:.2f} s in {trajectory.knots} intervals; longest flight {report.airborne:.2f} s",
+        "largest joint torque": f"{torque.torque:.1f} N m of {torque.joint} at {torque.when:.2f} s{share}",
         "thrust at the end": f"{100 * report.final_thrust_over_weight:.2f} % of the weight, vertically",
         "solver": ", ".join(filter(None, (status, took))) or "not known",
         "report made with": ", ".join([*versions, f"Python {platform.python_version()}"]),

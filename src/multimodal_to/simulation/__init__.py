@@ -1,7 +1,7 @@
 """A second opinion: a plan in MuJoCo, which shares no code with the problem that was solved."""
 
 from multimodal_to.simulation.agreement import by_mujoco, by_rnea, disagreement, random_states, states_along
-from multimodal_to.simulation.model import SimulationModel, build_model, effort_limits
+from multimodal_to.simulation.model import SimulationModel, build_model
 from multimodal_to.simulation.playback import Playback, play
 from multimodal_to.simulation.report import JointTorque, Switch, Tracking, simulated_trajectory, tracking
 
@@ -15,7 +15,6 @@ __all__ = [
     "by_mujoco",
     "by_rnea",
     "disagreement",
-    "effort_limits",
     "play",
     "random_states",
     "simulated_trajectory",

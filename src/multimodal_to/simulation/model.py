@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER
 from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.tree import Joint, Link
 from multimodal_to.adam.urdf import read_urdf
@@ -91,19 +90,6 @@ class SimulationModel:
         data.qvel[self.joint_velocities] = joint_velocities
 
 
-def effort_limits(robot: Robot) -> Array:
-    """Return the largest torque or force of each joint's motor [N m or N], (n,).
-
-    It is the URDF's effort limit, and infinite where that is a placeholder: `EFFORT_PLACEHOLDER` or more, or not above
-    zero.
-
-    Args:
-        robot: whose motors.
-    """
-    effort = robot.joint_limits.effort
-    return np.where((effort > 0.0) & (effort < EFFORT_PLACEHOLDER), effort, np.inf)
-
-
 def build_model(
     robot: Robot,
     surface: Surface | None = None,
@@ -121,7 +107,7 @@ def build_model(
         friction: Coulomb's μ, a round cone; the robot's own by default.
         middle: of the ground that is built where it is no plane [m], (2,); the world's origin by default.
         reach: how far that goes to each side [m].
-        torque_limits: clip what the servo of a joint gives at the joint's `effort_limits`.
+        torque_limits: clip what the servo of a joint gives at the joint's effort limit.
 
     Raises:
         OutputError: MuJoCo is not installed.
@@ -153,7 +139,7 @@ def build_model(
         )
     if surface is not None:
         _add_ground(mujoco, spec, surface, mu, np.zeros(2) if middle is None else middle, reach)
-    _add_actuators(mujoco, spec, robot, effort_limits(robot) if torque_limits else None)
+    _add_actuators(mujoco, spec, robot, robot.joint_limits.effort if torque_limits else None)
     try:
         model = spec.compile()
     except ValueError as error:

@@ -53,7 +53,7 @@ class Playback:
     throttle: Array  # [%], (steps, jets)
     torques: Array  # that the joints' motors give at a step's start, after the clip [N m or N], (steps, n)
     asked_torques: Array  # that the controller asks of them, before the clip [N m or N], (steps, n)
-    torque_limits: bool  # the clip was at `effort_limits`; else there was none
+    torque_limits: bool  # the clip was at the joints' effort limits; else there was none
     fell: float | None  # when [s]
 
 
@@ -70,7 +70,7 @@ def play(
         plan: its motion, with the scenario that it was solved for where it keeps one.
         stabilise: let the stabiliser correct thrusts, contact forces and joints.
         delay: of the motion after its forces, from 0 to 1 intervals of the plan.
-        torque_limits: clip the torque of each joint's motor at its `effort_limits`.
+        torque_limits: clip the torque of each joint's motor at its effort limit.
 
     Raises:
         OutputError: MuJoCo is not installed.

@@ -9,7 +9,7 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory, rules
-from multimodal_to.trajectory.derived import base_poses, generalised_forces
+from multimodal_to.trajectory.derived import base_poses, joint_torques
 from multimodal_to.trajectory.resampling import resample
 
 
@@ -63,7 +63,7 @@ def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) 
     def acting(name: str) -> Array:
         return at(getattr(plan, name), times + rules.instant(plan.rule, name) * interval)
 
-    torques = generalised_forces(robot, plan)[6:]
+    torques = joint_torques(robot, plan)
     if not rules.instant(plan.rule, "joint_velocities"):
         torques[:, 0] = torques[:, 1]  # such a trajectory doesn't tell the accelerations of its first knot
     held = np.minimum(np.searchsorted(knots, times - 1e-9), plan.knots)

@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.simulation.model import TIME_STEP, effort_limits
+from multimodal_to.simulation.model import TIME_STEP
 from multimodal_to.simulation.playback import Playback
 from multimodal_to.simulation.stabiliser import rotation_vector
 from multimodal_to.trajectory import Trajectory
-from multimodal_to.trajectory.derived import base_poses, contact_points
+from multimodal_to.trajectory.derived import base_poses, contact_points, loaded_force
 
-TOUCHING = 5.0
-"""A foot that bears more than this stands [N]."""
 BLINK = 0.1
 """A foot that stands or floats for less than this hasn't switched [s]."""
 
@@ -99,7 +97,7 @@ def tracking(playback: Playback) -> Tracking:
 
 def _joint_torques(playback: Playback) -> tuple[JointTorque, ...]:
     """Return what was asked of every joint that has an effort limit; rows after a fall repeat and don't count."""
-    limits = effort_limits(playback.robot)
+    limits = playback.robot.joint_limits.effort
     steps = playback.time.size
     if playback.fell is not None:
         steps = int(np.searchsorted(playback.time, playback.fell, side="right"))
@@ -121,7 +119,7 @@ def _end(playback: Playback) -> str:
     if playback.fell is not None:
         return "fell"
     last = playback.contact_forces[-100:, :, 2].sum(axis=1).mean()
-    if last > TOUCHING:
+    if last > loaded_force(playback.robot):
         return "stands"
     return "hovers" if np.linalg.norm(playback.qvel[-1, :3]) < 0.2 else "in the air"
 
@@ -138,13 +136,13 @@ def _rotations(qpos: Array) -> Array:
 
 def _switches(playback: Playback) -> tuple[Switch, ...]:
     """Return every planned touch-down and lift-off with the simulated one of the same kind that is nearest in time."""
-    found = []
+    found, touching = [], loaded_force(playback.robot)
     feet = dict.fromkeys(contact.foot for contact in playback.robot.contacts)
     for foot in feet:
         own = [index for index, contact in enumerate(playback.robot.contacts) if contact.foot == foot]
         times = playback.time
-        planned = _edges(times, playback.reference.contact_forces[:, own, 2].sum(axis=1) > TOUCHING)
-        simulated = _edges(times, np.linalg.norm(playback.contact_forces[:, own].sum(axis=1), axis=1) > TOUCHING)
+        planned = _edges(times, playback.reference.contact_forces[:, own, 2].sum(axis=1) > touching)
+        simulated = _edges(times, np.linalg.norm(playback.contact_forces[:, own].sum(axis=1), axis=1) > touching)
         for time, touches in planned:
             others = [other for other, kind in simulated if kind == touches]
             nearest = min(others, key=lambda other: abs(other - time)) if others else None
@@ -165,14 +163,16 @@ def _edges(times: Array, stands: Array) -> list[tuple[float, bool]]:
 
 
 def simulated_trajectory(playback: Playback) -> Trajectory:
-    """Return the motion at the knots of the plan, under the plan's scenario, to be drawn beside it.
+    """Return the motion at the instants of the plan, under the plan's scenario and rule, to be drawn beside it.
 
-    Rates are backward differences and contact forces and throttles means over the interval before each knot.
+    Rates are differences of columns, and contact forces and throttles means over the interval before each knot.
     """
     robot, plan = playback.robot, playback.plan
     grid = plan.time - plan.time[0]
     rows = np.clip(np.searchsorted(playback.time, grid - 1e-9), 0, playback.time.size - 1)
-    qpos, qvel = playback.qpos[rows].T, playback.qvel[rows].T
+    during = np.searchsorted(playback.time, plan.times("joint_velocities") - plan.time[0] - 1e-9)
+    during = np.clip(during, 0, playback.time.size - 1)  # the rows at the instants of the velocities
+    qpos, qvel = playback.qpos[rows].T, playback.qvel[during].T
     arrays: dict[str, Any] = {
         "base_position": qpos[:3],
         "base_quaternion_xyzw": qpos[[4, 5, 6, 3]],
@@ -183,13 +183,15 @@ def simulated_trajectory(playback: Playback) -> Trajectory:
         "com_position": playback.com[rows].T,
         "contact_forces": _means(playback.contact_forces.reshape(playback.time.size, -1), rows),
         "thrust": playback.thrust[rows].T,
-        "thrust_rate": playback.thrust_rate[rows].T,
+        "thrust_rate": playback.thrust_rate[during].T,
         "throttle": _means(playback.throttle, rows),
     }
     motion = replace(plan, scenario=f"{plan.scenario} in MuJoCo", solve_json="", **arrays)
-    poses = np.hstack(list(base_poses(motion)))
     points = contact_points(robot, motion)
-    momenta = np.array(robot.kindyn.centroidal_momentum_fun().map(grid.size)(poses, qpos[7:], qvel[:6], qvel[6:]))
+    moving = playback.qpos[during].T
+    poses = base_poses(replace(motion, base_position=moving[:3], base_quaternion_xyzw=moving[[4, 5, 6, 3]]))
+    momentum = robot.kindyn.centroidal_momentum_fun().map(grid.size)
+    momenta = np.array(momentum(np.hstack(list(poses)), moving[7:], qvel[:6], qvel[6:]))
     arrays = {
         "com_velocity": momenta[:3] / robot.mass,
         "angular_momentum": momenta[3:],

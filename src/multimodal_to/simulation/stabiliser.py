@@ -30,6 +30,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.simulation.model import SimulationModel, mujoco_module
 from multimodal_to.simulation.reference import Reference
+from multimodal_to.trajectory.derived import flight_force
 
 COM_STIFFNESS, COM_DAMPING = 6.0, 5.0  # K_x [1/s²], D_x [1/s]
 ATTITUDE_STIFFNESS, ATTITUDE_DAMPING = 16.0, 8.0  # K_R [1/s²], D_h [1/s]
@@ -39,7 +40,6 @@ THRUST_SPREAD = 20.0  # σ_T: of a thrust in flight [N]
 LOAD_SPREAD = 0.5  # σ of a contact force, as a share of the planned load of its point [1]
 JOINT_SPREAD = 0.1  # σ of a joint in flight [rad]
 JOINT_MAX = 0.3  # how far a joint leaves the plan [rad]
-LOADED = 1.0  # a foot that the plan loads with more, and that touches, stands [N]
 # Weights of the horizontal forces, the vertical one [1/N], and the moments [1/(N m)].
 THRUST_WEIGHTS = np.array([0.3, 0.3, 1.0, 5.0, 5.0, 5.0])
 FORCE_WEIGHTS = np.array([1.0, 1.0, 1.0, 5.0, 5.0, 5.0])
@@ -99,7 +99,7 @@ def correct(
     loads = np.maximum(plan.contact_forces[step][:, 2], 0.0)
     same_foot = np.array([[one.foot == other.foot for other in robot.contacts] for one in robot.contacts])
     touches = same_foot @ np.isin(simulation.points, data.contact.geom)
-    standing = np.flatnonzero((same_foot @ loads > LOADED) & touches)
+    standing = np.flatnonzero((same_foot @ loads > flight_force(robot)) & touches)  # loaded by the plan
     stands, load = bool(standing.size), float(loads[standing].sum())
     free = max(0.0, 1.0 - load / robot.weight)
     wanted = _wanted(simulation, data, plan, step, inertia, free)

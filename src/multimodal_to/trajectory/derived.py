@@ -15,18 +15,23 @@ from multimodal_to.adam.spatial import Array, homogeneous
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import Surface, frame_function
 from multimodal_to.trajectory import rules
-from multimodal_to.trajectory.quantities import QUANTITIES
+from multimodal_to.trajectory.quantities import QUANTITIES, SCALAR, Quantity
 from multimodal_to.trajectory.resampling import resample
 from multimodal_to.trajectory.trajectory import Trajectory
 
-FLIGHT_FORCE = 1.0
-"""Below this total vertical contact force the robot counts as flying [N]."""
-LOADED = 5.0
-"""A contact point carries load above this normal force [N]."""
-STEP_LIFT = 0.01
-"""A foot has stepped when all of it was at least this far off the ground [m] ..."""
-STEP_LENGTH = 0.05
-"""... and it came down at least this far from where it stood [m]."""
+FLIGHT_SHARE = 0.0025
+"""Below this total vertical contact force the robot counts as flying, as a share of its weight [1]."""
+LOADED_SHARE = 0.09
+"""A contact point carries load above this normal force, as a share of the weight over the contact points [1]."""
+LIFT_SHARE = 0.0175
+"""A foot has stepped when all of it was at least this far off the ground, as a share of the standing height [1] ..."""
+LENGTH_SHARE = 0.087
+"""... and it came down at least this far from where it stood, as a share of the standing height [1]."""
+
+JOINT_TORQUES = Quantity(
+    axes=SCALAR, of="joint", unit="N m", meaning="τ, torques of the joints' motors, by inverse dynamics"
+)
+"""What `joint_torques` returns. A trajectory does not keep it; it follows from the motion and the robot."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +43,41 @@ class Footstep:
     touch_down: float  # the first time with load again [s]
     length: float  # along the ground, of the middle of the contact points [m]
     lift: float  # greatest height of the lowest contact point [m]
+
+
+def flight_force(robot: Robot) -> float:
+    """Return below which total vertical contact force the robot counts as flying [N]: `FLIGHT_SHARE` of its weight."""
+    return FLIGHT_SHARE * robot.weight
+
+
+def loaded_force(robot: Robot) -> float:
+    """Return above which normal force a contact point carries load [N]: `LOADED_SHARE` of its share of the weight."""
+    return LOADED_SHARE * robot.weight / max(len(robot.contacts), 1)
+
+
+def step_lift(robot: Robot) -> float:
+    """Return how far off the ground a foot has to be to have stepped [m]: `LIFT_SHARE` of the standing height."""
+    return LIFT_SHARE * robot.standing_height
+
+
+def step_length(robot: Robot) -> float:
+    """Return how far from where it stood a foot has to come down to have stepped [m]: `LENGTH_SHARE` of the height."""
+    return LENGTH_SHARE * robot.standing_height
+
+
+@dataclass(frozen=True, kw_only=True)
+class LargestTorque:
+    """The largest torque that a motion asks of a joint's motor, either way."""
+
+    joint: str
+    torque: float  # [N m], or [N] of a prismatic joint
+    when: float  # [s]
+    effort: float  # the joint's limit in the same unit; inf where none is known
+
+    @property
+    def over_effort(self) -> float:
+        """Return the share of the effort limit; zero where there is none."""
+        return self.torque / self.effort
 
 
 def base_poses(trajectory: Trajectory) -> Array:
@@ -81,7 +121,8 @@ def surface_frames(surface: Surface, points: Array) -> tuple[Array, Array, Array
 def contact_products(robot: Robot, trajectory: Trajectory, surface: Surface) -> tuple[Array, Array]:
     """Return what complementarity bounds [N m], (contacts, knots + 1) each: height and slip, times the normal force.
 
-    The slip is that over the interval that ends at the knot, ‖tᵀ Δp‖.
+    The slip is that over the interval that ends at the knot, ‖tᵀ Δp‖. Where a contact force is that of an interval, the
+    height is the greater one of the interval's ends.
 
     Args:
         robot: the robot of the trajectory; its contact points come from forward kinematics.
@@ -92,12 +133,15 @@ def contact_products(robot: Robot, trajectory: Trajectory, surface: Surface) -> 
     heights, normals, tangents = surface_frames(surface, points)
     normal = np.einsum("ckx,cxk->ck", normals, trajectory.per_contact("contact_forces"))
     moves = np.diff(points, axis=1, prepend=points[:, :1])
+    if rules.held(trajectory.rule, "contact_forces"):
+        heights = np.maximum(heights, np.hstack([heights[:, :1], heights[:, :-1]]))
     return heights * normal, np.linalg.norm(np.einsum("ckxt,ckx->ckt", tangents, moves), axis=2) * normal
 
 
 def thrust_forces(robot: Robot, trajectory: Trajectory) -> tuple[Array, Array]:
     """Return where each jet pushes [m] and with what force [N], (jets, knots + 1, 3) each, world axes."""
-    poses = [frame_poses(robot, trajectory, jet.frame) for jet in robot.jets]
+    jets = robot.with_jets(trajectory.jet_names).jets
+    poses = [frame_poses(robot, trajectory, jet.frame) for jet in jets]
     points = np.array([pose[:, :3, 3] for pose in poses]).reshape(-1, trajectory.time.size, 3)
     axes = np.array([pose[:, :3, 2] for pose in poses]).reshape(points.shape)
     return points, -trajectory.thrust[:, :, None] * axes
@@ -108,16 +152,23 @@ def vertical_thrust(robot: Robot, trajectory: Trajectory) -> Array:
     return np.asarray(thrust_forces(robot, trajectory)[1][:, :, 2].sum(axis=0))
 
 
-def flying(trajectory: Trajectory) -> np.ndarray:
-    """Return at which knots the total vertical contact force is below `FLIGHT_FORCE`, (knots + 1,)."""
-    return trajectory.vertical_contact_force() < FLIGHT_FORCE
+def flying(robot: Robot, trajectory: Trajectory) -> np.ndarray:
+    """Return in which columns the total vertical contact force is below `flight_force`, (knots + 1,).
+
+    A column is of a knot, or of the interval that ends there, as the trajectory's rule has it.
+
+    Args:
+        robot: whose weight is the measure.
+        trajectory: the motion.
+    """
+    return trajectory.vertical_contact_force() < flight_force(robot)
 
 
 def footsteps(robot: Robot, trajectory: Trajectory, surface: Surface) -> list[Footstep]:
     """Return the steps in the order in which they start.
 
-    A foot stands while one of its contact points carries more than `LOADED`. What is in between is a step if the foot's
-    lowest point was at least `STEP_LIFT` high and its middle came down at least `STEP_LENGTH` away.
+    A foot stands while one of its contact points carries more than `loaded_force`. What is in between is a step if the
+    foot's lowest point was at least `step_lift` high and its middle came down at least `step_length` away.
 
     Args:
         robot: says which contact points make a foot.
@@ -126,8 +177,10 @@ def footsteps(robot: Robot, trajectory: Trajectory, surface: Surface) -> list[Fo
     """
     points = contact_points(robot, trajectory)
     heights, normals, _ = surface_frames(surface, points)
-    loaded = np.einsum("ckx,cxk->ck", normals, trajectory.per_contact("contact_forces")) > LOADED
-    steps = []
+    normal = np.einsum("ckx,cxk->ck", normals, trajectory.per_contact("contact_forces"))
+    loaded = normal > loaded_force(robot)
+    steps, least_length, least_lift = [], step_length(robot), step_lift(robot)
+    over_interval = int(rules.held(trajectory.rule, "contact_forces"))  # then load begins at the interval's start
     for foot in dict.fromkeys(contact.foot for contact in robot.contacts):
         members = [index for index, contact in enumerate(robot.contacts) if contact.foot == foot]
         lowest, middle = heights[members].min(axis=0), points[members].mean(axis=0)[:, :2]
@@ -135,16 +188,26 @@ def footsteps(robot: Robot, trajectory: Trajectory, surface: Surface) -> list[Fo
         for before, after in itertools.pairwise(stands):
             length = float(np.linalg.norm(middle[after] - middle[before]))
             lift = float(lowest[before : after + 1].max())
-            if length >= STEP_LENGTH and lift >= STEP_LIFT:
-                start, end = float(trajectory.time[before]), float(trajectory.time[after])
+            if length >= least_length and lift >= least_lift:
+                start, end = float(trajectory.time[before]), float(trajectory.time[after - over_interval])
                 steps.append(Footstep(foot=foot, lift_off=start, touch_down=end, length=length, lift=lift))
     return sorted(steps, key=lambda step: step.lift_off)
 
 
-def flight_phases(trajectory: Trajectory) -> list[tuple[float, float]]:
-    """Return start and end [s] of each run of knots in flight."""
-    edges = np.concatenate(([False], flying(trajectory), [False]))
+def flight_phases(robot: Robot, trajectory: Trajectory) -> list[tuple[float, float]]:
+    """Return start and end [s] of each run of knots in flight, or of intervals where contact forces belong to these.
+
+    Args:
+        robot: whose weight is the measure, `flight_force`.
+        trajectory: the motion.
+    """
+    aloft = flying(robot, trajectory)
+    by_interval = rules.held(trajectory.rule, "contact_forces")
+    if by_interval:
+        aloft = np.concatenate(([False], aloft[1:]))  # no interval ends at the first knot
+    edges = np.concatenate(([False], aloft, [False]))
     starts, ends = np.flatnonzero(~edges[:-1] & edges[1:]), np.flatnonzero(edges[:-1] & ~edges[1:]) - 1
+    starts -= by_interval
     return [(float(trajectory.time[i]), float(trajectory.time[j])) for i, j in zip(starts, ends, strict=True)]
 
 
@@ -199,7 +262,7 @@ def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
     τ = M ν̇ + C ν + g − Σ Jᵀ f by RNEA: the wrench left for the base [N, N m], which is zero on a true motion, then the
     joint torques [N m]. All is at the instants of the knots: `at_knots`, `accelerations_at_knots`.
     """
-    count = trajectory.time.size
+    robot, count = robot.with_jets(trajectory.jet_names), trajectory.time.size
     names = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
     velocities = np.vstack([at_knots(trajectory, name) for name in names])
     accelerations = np.vstack([accelerations_at_knots(trajectory, name) for name in names])
@@ -217,3 +280,36 @@ def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
             *(np.vstack([force, np.zeros((3, count))]) for force in (*contacts, *thrusts)),
         )
     )
+
+
+def joint_torques(robot: Robot, trajectory: Trajectory) -> Array:
+    """Return the torques of the joints' motors by inverse dynamics [N m], forces [N] of prismatic ones, (n, knots + 1).
+
+    They are the last n rows of `generalised_forces`, at the instants of the knots. At one knot they have no meaning,
+    since the trajectory does not tell its acceleration: `without_acceleration`.
+    """
+    return generalised_forces(robot, trajectory)[6:]
+
+
+def without_acceleration(trajectory: Trajectory) -> int:
+    """Return the index of the knot whose acceleration the trajectory does not tell: the first, 0, or the last, −1.
+
+    Backward Euler tells accelerations of intervals' ends; the staggered rule, of knots where two intervals meet.
+    """
+    return -1 if rules.instant(trajectory.rule, "joint_velocities") else 0
+
+
+def largest_torques(robot: Robot, trajectory: Trajectory) -> tuple[LargestTorque, ...]:
+    """Return the largest torque of every joint along a motion; the first one is the nearest to its effort limit.
+
+    Args:
+        robot: the robot of the trajectory.
+        trajectory: the motion.
+    """
+    known = np.delete(np.arange(trajectory.time.size), without_acceleration(trajectory))
+    torques, times = np.abs(joint_torques(robot, trajectory)[:, known]), trajectory.time[known]
+    found = [
+        LargestTorque(joint=name, torque=float(row.max()), when=float(times[row.argmax()]), effort=float(effort))
+        for name, row, effort in zip(robot.joint_names, torques, robot.joint_limits.effort, strict=True)
+    ]
+    return tuple(sorted(found, key=lambda one: (-one.over_effort, -one.torque)))

@@ -40,16 +40,14 @@ def regrid(trajectory: Trajectory, knots: int, rule: str) -> Trajectory:
         rule: name of the integration rule.
     """
     grid = np.linspace(trajectory.time[0], trajectory.time[-1], knots + 1)
-    arrays: dict[str, Any] = {
-        name: _at(trajectory, name, _instants(grid, rules.instant(rule, name))) for name in QUANTITIES
-    }
+    arrays: dict[str, Any] = {name: _at(trajectory, name, rules.instants(grid, rule, name)) for name in QUANTITIES}
     return replace(trajectory, time=grid, rule=rule, **arrays)
 
 
 def _at(trajectory: Trajectory, name: str, times: Array) -> Array:
     """Return a quantity at times [s]; before its first instant and after its last it is what it is there."""
     values = getattr(trajectory, name)
-    own = _instants(trajectory.time, rules.instant(trajectory.rule, name))
+    own = trajectory.times(name)
     wanted = np.clip(times, own[0], own[-1])
     before = np.clip(np.searchsorted(own, wanted, side="right") - 1, 0, own.size - 2)
     share = (wanted - own[before]) / (own[before + 1] - own[before])
@@ -57,11 +55,6 @@ def _at(trajectory: Trajectory, name: str, times: Array) -> Array:
     if name == "base_quaternion_xyzw":
         return _slerp(start, end, share)
     return np.asarray((1.0 - share) * start + share * end)
-
-
-def _instants(grid: Array, before: float) -> Array:
-    """Return the times that lie a share of an interval before each knot [s]."""
-    return np.asarray(grid - before * np.diff(grid, prepend=2 * grid[0] - grid[1]))
 
 
 def _slerp(start: Array, end: Array, share: Array) -> Array:

@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+import numpy as np
+
+from multimodal_to.adam.spatial import Array
+
 BACKWARD_EULER = "backward Euler"
 STAGGERED = "staggered"
 SAMPLED = "sampled"
@@ -21,6 +25,8 @@ OVER_INTERVALS = (
     "throttle",
 )
 """What belongs to an interval under the staggered rule; column k is of the interval that ends at knot k."""
+HELD = ("contact_forces", "throttle")
+"""What is constant over an interval under the staggered rule; the rest of `OVER_INTERVALS` is at its middle."""
 RATES = ("com_acceleration", "angular_momentum_rate", "thrust_acceleration", "contact_force_rates")
 """The differences between two intervals: column k lies between the intervals before and after knot k − 1."""
 
@@ -39,6 +45,24 @@ def all_at_knots(rule: str) -> bool:
     return not INSTANTS.get(rule)
 
 
+def held(rule: str, name: str) -> bool:
+    """Return whether a quantity is constant over the interval that ends at its knot."""
+    return bool(instant(rule, name)) and name in HELD
+
+
 def instant(rule: str, name: str) -> float:
     """Return how far before its knot a quantity is, in intervals; zero for a rule that this release does not know."""
     return INSTANTS.get(rule, INSTANTS[BACKWARD_EULER]).get(name, 0.0)
+
+
+def instants(grid: Array, rule: str, name: str) -> Array:
+    """Return at which times the columns of a quantity are [s], (knots + 1,).
+
+    Before the first knot is an interval as long as the first one.
+
+    Args:
+        grid: times of the knots [s], (knots + 1,).
+        rule: name of the integration rule.
+        name: of the quantity.
+    """
+    return np.asarray(grid - instant(rule, name) * np.diff(grid, prepend=2 * grid[0] - grid[1]))

@@ -143,6 +143,18 @@ class Trajectory:
         """
         return labels(name, self)
 
+    def times(self, name: str) -> Array:
+        """Return at which times the columns of a quantity are [s], (knots + 1,), as the rule has it.
+
+        The first one is before the first knot where the quantity is not at the ends of intervals.
+
+        Raises:
+            InputError: there is no such quantity.
+        """
+        if name not in QUANTITIES:
+            raise InputError(unknown("quantity", name, QUANTITIES))
+        return rules.instants(self.time, self.rule, name)
+
     def per_contact(self, name: str) -> Array:
         """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1).
 
