@@ -30,7 +30,7 @@ from multimodal_to.trajectory import Trajectory, rules
 Indices = NDArray[np.intp]
 STRETCH = 2.0
 """For how long the integrator runs from a knot, in √(L/g): 0.48 s for the iRonCub."""
-_LARGEST_STEP = 0.05  # of the integrator [s]; its own error is then below 1e-5 m and 1e-5 rad
+_LARGEST_STEP = 0.05  # of the integrator [s]; its own error is then below 1e-5 m and 1e-4 rad
 _X, _V, _H, _RHO, _THRUSTS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13), 13
 """Where the parts of a state are; T and Ṫ of all jets follow from `_THRUSTS` on."""
 
@@ -94,10 +94,10 @@ class Controls:
 
         Args:
             motion: that holds them.
-            steps: of the integrator, an interval; by default what `_LARGEST_STEP` asks for, at least two.
+            steps: of the integrator, an interval; by default what `_LARGEST_STEP` asks for.
         """
         robot, trajectory, kindyn = motion.robot, motion.trajectory, motion.robot.kindyn
-        steps = steps or max(2, int(np.ceil(np.diff(trajectory.time).max() / _LARGEST_STEP - 1e-9)))
+        steps = steps or max(1, int(np.ceil(np.diff(trajectory.time).max() / _LARGEST_STEP - 1e-9)))
         instants = _instants(trajectory.time, 2 * steps)
         count, jets = instants.size, len(robot.jets)
         joints, velocities = spline(trajectory.time, trajectory.joint_positions.T, instants)
@@ -159,7 +159,8 @@ class Controls:
         moment = np.cross(self.points[instants] - states[:, None, _X], contacts).sum(axis=1)
         moment = moment + np.cross(arms, thrusts).sum(axis=1)
         within = np.einsum("sji,sj->si", rotation, states[:, _H]) - self.joint_momentum[instants]
-        omega = np.einsum("sij,sjk,sk->si", rotation, self.inertia_inverse[instants], within)
+        turn = np.einsum("sij,sj->si", self.inertia_inverse[instants], within)
+        omega = np.einsum("sij,sj->si", rotation, turn)
         vector, scalar = states[:, 9:12], states[:, 12:13]
         turning = 0.5 * np.hstack([scalar * omega + np.cross(omega, vector), -(omega * vector).sum(1, keepdims=True)])
         spooling = np.zeros_like(thrust)
@@ -252,17 +253,20 @@ def spline(time: Array, values: Array, at: Array) -> tuple[Array, Array]:
         at: where it is asked for, within the knots [s], (count,).
     """
     last, h = time.size - 1, np.diff(time)
-    inner = range(1, last)
-    matrix = cs.DM.eye(last + 1)  # of the second derivatives at the knots
-    right = np.zeros_like(values)
-    if last >= 3:
-        matrix[0, :3] = cs.DM([[h[1], -h[0] - h[1], h[0]]])
-        matrix[last, last - 2 :] = cs.DM([[h[-1], -h[-1] - h[-2], h[-2]]])
-    for knot in inner:
-        matrix[knot, knot - 1 : knot + 2] = cs.DM([[h[knot - 1], 2.0 * (h[knot - 1] + h[knot]), h[knot]]])
-    slopes = np.diff(values, axis=0) / h[:, None]
+    slopes, right = np.diff(values, axis=0) / h[:, None], np.zeros_like(values)
     right[1:-1] = 6.0 * np.diff(slopes, axis=0)
-    second = np.array(cs.solve(matrix, cs.DM(right), "qr")).reshape(values.shape)
+    inner = np.arange(1, last)
+    rows, columns = np.repeat(inner, 3), (inner[:, None] + [-1, 0, 1]).ravel()
+    entries = np.column_stack([h[:-1], 2.0 * (h[:-1] + h[1:]), h[1:]]).ravel()
+    if last >= 3:
+        ends = [h[1], -h[0] - h[1], h[0], h[-1], -h[-1] - h[-2], h[-2]]
+        around = [0, 1, 2, last - 2, last - 1, last]
+        rows, columns = np.append(rows, [0, 0, 0, last, last, last]), np.append(columns, around)
+    else:
+        ends = [1.0, 1.0]
+        rows, columns = np.append(rows, [0, last]), np.append(columns, [0, last])
+    matrix = cs.DM.triplet(list(rows), list(columns), cs.DM(np.append(entries, ends)), last + 1, last + 1)
+    second = np.array(cs.solve(matrix, cs.DM(right), "qr")).reshape(values.shape)  # the second derivatives at the knots
     cell = np.clip(np.searchsorted(time, at, side="right") - 1, 0, last - 1)
     width, past, left = h[cell, None], (at - time[cell])[:, None], (time[cell + 1] - at)[:, None]
     start, end = second[cell], second[cell + 1]
