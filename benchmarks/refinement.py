@@ -1,6 +1,7 @@
 """Of which order the integration rules are: errors against an accurate integrator on Δt, Δt/2 and Δt/4.
 
     python benchmarks/refinement.py [SCENARIO | TRAJECTORY.npz | free-flight ...] [--rule backward-euler staggered]
+                                    [--into docs/mathematics.md]
     python benchmarks/refinement.py --solve [SCENARIO ...] [--rule paper staggered] [--parts 1 2 4]
 
 The first command takes the controls of one motion as functions of time: contact forces and throttles, constant over its
@@ -14,7 +15,8 @@ The second command solves each scenario with N, 2N and 4N intervals, each from t
 audit finds. Answers on finer steps are other motions. So these orders say how plans get better, and scatter more. 4N
 intervals of a long scenario take minutes to hours.
 
-The order between two rows is log₂ of the ratio of their errors.
+The order between two rows is log₂ of the ratio of their errors. `--into` also sets the table, with the last order of
+each rule, between the marks of a page.
 """
 
 from __future__ import annotations
@@ -22,10 +24,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import casadi as cs
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 import multimodal_to as mt
@@ -48,6 +52,7 @@ FORMULATIONS: dict[str, Callable[[], mt.Formulation]] = {
 RULES: dict[str, IntegrationRule] = {"backward-euler": BACKWARD_EULER, "staggered": STAGGERED}
 FREE_FLIGHT = "free-flight"
 PARTS = (1, 2, 4)
+BEGIN, END = "<!-- refinement: begin -->", "<!-- refinement: end -->"
 ROUNDING = 1e-4  # errors below it have no order [mm, °, N]
 ROWS = (
     constraints.momentum_dynamics,
@@ -236,6 +241,62 @@ def controls_of(name: str) -> Controls:
     return Controls.of(Motion.of(robot, plan), steps=16)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """The errors of a rule on the controls of a motion, one for each step."""
+
+    rule: str
+    steps: tuple[float, ...]  # [s]
+    parts: tuple[int, ...]  # into how many of them an interval is divided
+    errors: tuple[Errors, ...]
+
+    @property
+    def columns(self) -> dict[str, list[float]]:
+        """Return the errors of CoM [mm], base [°] and thrust [N], by head of their columns."""
+        return {
+            "CoM [mm]": [1e3 * entry.com for entry in self.errors],
+            "base [°]": [float(np.degrees(entry.base)) for entry in self.errors],
+            "thrust [N]": [entry.thrust for entry in self.errors],
+        }
+
+
+def study(controls: Controls, chosen: list[str], parts: tuple[int, ...], starts: int) -> list[Study]:
+    """Return the errors of rules on a motion's controls."""
+    interval = controls.trajectory.duration / controls.trajectory.knots
+    steps = tuple(interval / count for count in parts)
+    return [
+        Study(rule=rule, steps=steps, parts=parts, errors=tuple(errors(controls, RULES[rule], parts, starts)))
+        for rule in chosen
+    ]
+
+
+def controls_table(found: dict[str, list[Study]]) -> Table:
+    """Return the errors of each motion, rule and step as a table."""
+    table = Table(*map(escape, ("motion", "rule", "step [ms]", "CoM [mm]", "base [°]", "thrust [N]")))
+    for name, studies in found.items():
+        for entry in studies:
+            rows = with_orders(list(entry.columns.values()), entry.parts)
+            for step, row in zip(entry.steps, rows, strict=True):
+                table.add_row(name, entry.rule, f"{1e3 * step:.3g}", *row)
+    return table
+
+
+def markdown(found: dict[str, list[Study]]) -> str:
+    """Return the errors as a table of a page, one row for each motion and rule, with the order of its last steps."""
+    lines = ["| motion | rule | steps [ms] | CoM [mm] | base [°] | thrust [N] |", "|--|--|--|--|--|--|"]
+    for name, studies in found.items():
+        for entry in studies:
+            cells = [name, entry.rule.replace("-", " "), ", ".join(f"{1e3 * step:.3g}" for step in entry.steps)]
+            for column in entry.columns.values():
+                if max(column) <= ROUNDING:
+                    cells.append("exact" if max(column) > 0.0 else "–")
+                else:
+                    order = orders(column, entry.parts)[-1]
+                    cells.append(f"{', '.join(f'{value:.2g}' for value in column)}; order {order:.1f}")
+            lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 # -------------------------------------------------------------------- plans on finer and finer steps
 
 
@@ -264,6 +325,24 @@ FOUND = {
 """Which properties of the audit `--solve` shows, by which head, and in which unit."""
 
 
+def solve_study(names: list[str], chosen: list[str], parts: tuple[int, ...]) -> Table:
+    """Return what the audit finds in answers on finer and finer steps; a motion's starts are all its knots."""
+    heads = [escape(head) for head, _ in FOUND.values()]
+    table = Table("scenario", "formulation", "intervals", "status", "iterations", *heads)
+    for name in names:
+        for formulation in chosen:
+            found = solved(name, formulation, parts)
+            shown = [entry for entry in FOUND if any(finding.name == entry for finding in found[0][1].findings)]
+            columns = [[FOUND[entry][1] * report[entry].worst for _, report in found] for entry in shown]
+            for (solution, _), row in zip(found, with_orders(columns, parts), strict=True):
+                state = (solution.status.value, str(solution.iterations))
+                table.add_row(name, formulation, str(solution.trajectory.knots), *state, *row)
+    return table
+
+
+# -------------------------------------------------------------------- tables
+
+
 def with_orders(columns: list[list[float]], parts: tuple[int, ...]) -> list[list[str]]:
     """Return rows of a table: each error with the order since the row before."""
     texts = []
@@ -274,6 +353,15 @@ def with_orders(columns: list[list[float]], parts: tuple[int, ...]) -> list[list
     return [list(row) for row in zip(*texts, strict=True)]
 
 
+def put(page: Path, text: str) -> None:
+    """Set the text between the marks of a page."""
+    before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)
+    _, mark, after = rest.partition(END)
+    if not mark:
+        raise SystemExit(f"{page} lacks the marks {BEGIN} and {END}")
+    page.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}", encoding="utf-8")
+
+
 def main() -> None:
     """Run a study and print its table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -282,6 +370,7 @@ def main() -> None:
     parser.add_argument("--solve", action="store_true", help="solve each scenario on each step")
     parser.add_argument("--parts", nargs="+", type=int, default=PARTS, help="into which intervals are divided")
     parser.add_argument("--starts", type=int, default=10, help="of stretches in a motion")
+    parser.add_argument("--into", type=Path, metavar="PAGE", help="also set the table between the marks of a page")
     options = parser.parse_args()
     names, parts = options.motions or list(scenarios.SCENARIOS), tuple(options.parts)
     if not options.motions and not options.solve:
@@ -290,36 +379,13 @@ def main() -> None:
     chosen = options.rule or list(known)
     if unknown := [rule for rule in chosen if rule not in known]:
         parser.error(f"no rule {unknown[0]}; expected {', '.join(known)}")
-    (solve_study if options.solve else controls_study)(Console(), names, chosen, parts, options.starts)
-
-
-def controls_study(console: Console, names: list[str], chosen: list[str], parts: tuple[int, ...], starts: int) -> None:
-    """Print the errors of rules on the controls of each motion."""
-    table = Table("motion", "rule", "step [ms]", "CoM [mm]", "base [°]", "thrust [N]")
-    for name in names:
-        controls = controls_of(name)
-        interval = controls.trajectory.duration / controls.trajectory.knots
-        for rule in chosen:
-            found = errors(controls, RULES[rule], parts, starts)
-            columns = [[1e3 * some.com for some in found], [float(np.degrees(some.base)) for some in found]]
-            rows = with_orders([*columns, [some.thrust for some in found]], parts)
-            for count, row in zip(parts, rows, strict=True):
-                table.add_row(name, rule, f"{1e3 * interval / count:.3g}", *row)
-    console.print(table)
-
-
-def solve_study(console: Console, names: list[str], chosen: list[str], parts: tuple[int, ...], starts: int) -> None:
-    """Print what the audit finds in answers on finer and finer steps; a motion's starts are all its knots."""
-    table = Table("scenario", "formulation", "intervals", "status", "iterations", *(head for head, _ in FOUND.values()))
-    for name in names:
-        for formulation in chosen:
-            found = solved(name, formulation, parts)
-            shown = [entry for entry in FOUND if any(finding.name == entry for finding in found[0][1].findings)]
-            columns = [[FOUND[entry][1] * report[entry].worst for _, report in found] for entry in shown]
-            for (solution, _), row in zip(found, with_orders(columns, parts), strict=True):
-                state = (solution.status.value, str(solution.iterations))
-                table.add_row(name, formulation, str(solution.trajectory.knots), *state, *row)
-    console.print(table)
+    if options.solve:
+        Console().print(solve_study(names, chosen, parts))
+        return
+    found = {name: study(controls_of(name), chosen, parts, options.starts) for name in names}
+    Console().print(controls_table(found))
+    if options.into:
+        put(options.into, markdown(found))
 
 
 if __name__ == "__main__":

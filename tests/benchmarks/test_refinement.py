@@ -82,14 +82,26 @@ def test_plans_on_finer_steps_are_solved_and_shown_with_their_orders(monkeypatch
     assert "optimal" in fine
 
 
-def test_a_study_of_controls_prints_each_rule_on_each_step(monkeypatch, capsys):
+def test_a_study_of_controls_prints_each_rule_on_each_step_and_fills_a_page(monkeypatch, capsys, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{refinement.BEGIN}\nold\n{refinement.END}\nafter\n", encoding="utf-8")
     monkeypatch.setenv("COLUMNS", "160")
-    monkeypatch.setattr(sys, "argv", ["refinement", "free-flight", "--parts", "1", "2"])
+    monkeypatch.setattr(sys, "argv", ["refinement", "free-flight", "--parts", "1", "2", "--into", str(page)])
     refinement.main()
     lines = [line for line in capsys.readouterr().out.splitlines() if "free-flight" in line]
     assert [line.split("│")[2].strip() for line in lines] == ["backward-euler"] * 2 + ["staggered"] * 2
     assert "(1.0)" in lines[1]
     assert "(2.0)" in lines[3]
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("before\n")
+    assert text.endswith("after\n")
+    assert "old" not in text
+    first, second = (line for line in text.splitlines() if line.startswith("| free-flight"))
+    assert first.endswith("; order 1.0 | – |")
+    assert "| staggered | 50, 25 | exact | " in second
+    page.write_text("no marks", encoding="utf-8")
+    with pytest.raises(SystemExit, match="lacks the marks"):
+        refinement.main()
 
 
 def test_a_rule_that_does_not_exist_is_refused(monkeypatch, capsys):
