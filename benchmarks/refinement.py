@@ -286,13 +286,13 @@ def markdown(found: dict[str, list[Study]]) -> str:
     lines = ["| motion | rule | steps [ms] | CoM [mm] | base [°] | thrust [N] |", "|--|--|--|--|--|--|"]
     for name, studies in found.items():
         for entry in studies:
-            cells = [name, entry.rule.replace("-", " "), ", ".join(f"{1e3 * step:.3g}" for step in entry.steps)]
+            cells = [name, RULES[entry.rule].name, ", ".join(f"{1e3 * step:.3g}" for step in entry.steps)]
             for column in entry.columns.values():
                 if max(column) <= ROUNDING:
                     cells.append("exact" if max(column) > 0.0 else "–")
                 else:
                     order = orders(column, entry.parts)[-1]
-                    cells.append(f"{', '.join(f'{value:.2g}' for value in column)}; order {order:.1f}")
+                    cells.append(f"{', '.join(f'{value:.3g}' for value in column)}; order {order:.1f}")
             lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
