@@ -153,10 +153,10 @@ def properties() -> str:
 
 
 def _limit(entry: Property) -> str:
-    text = f"{entry.limit:g} × weight" if entry.of_weight else f"{entry.limit:g} {entry.unit}".removesuffix(" 1")
-    if entry.second_order_limit is not None:
-        text += f"; second-order cone {entry.second_order_limit:g} {entry.unit}"
-    return text
+    share = "× weight" if entry.of_weight else "× standing height" if entry.of_height else entry.unit
+    others = {"second-order cone": entry.second_order_limit, "rule of order one": entry.first_order_limit}
+    parts = [f"{entry.limit:g} {share}", *(f"{name} {limit:g} {share}" for name, limit in others.items() if limit)]
+    return "; ".join(part.removesuffix(" 1") for part in parts)
 
 
 # ---------------------------------------------------------------- files of TOML

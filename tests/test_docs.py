@@ -81,8 +81,12 @@ def test_every_property_of_the_audit_is_on_its_page_with_the_limit_that_judges(i
     for finding in mt.audit(ironcub, take_off.trajectory).findings:
         row = next(line for line in text.splitlines() if line.startswith(f"| `{finding.name}` |"))
         entry = PROPERTIES[finding.name]
-        limit = finding.limit / ironcub.weight if entry.of_weight else finding.limit
-        assert f"| {limit:g} {'× weight' if entry.of_weight else entry.unit}".removesuffix(" 1") in row
+        whole, share = 1.0, entry.unit
+        if entry.of_weight:
+            whole, share = ironcub.weight, "× weight"
+        if entry.of_height:
+            whole, share = ironcub.standing_height, "× standing height"
+        assert f" {finding.limit / whole:g} {share}".removesuffix(" 1") in row
         assert entry.reason in row
     assert all(f"| `{name}` |" in text for name in PROPERTIES)
 

@@ -148,6 +148,13 @@ def test_its_thrusts_are_nearer_to_those_of_an_accurate_integrator(ironcub, touc
     assert second < 0.8 * first
 
 
+def test_its_controls_through_an_accurate_integrator_lead_nearer_to_it(ironcub, touch_down):
+    first, second = (mt.audit(ironcub, some.trajectory) for some in touch_down)
+    for name in ("CoM off integrator, stretch", "base off integrator, stretch"):
+        assert second[name].worst < 0.5 * first[name].worst
+    assert second["CoM off integrator, horizon"].worst < 0.05 * first["CoM off integrator, horizon"].worst
+
+
 def test_a_force_of_an_interval_has_its_foot_on_the_ground_at_both_ends(touch_down):
     motion = touch_down[1].trajectory
     heights = motion.per_contact("contact_positions")[:, 2]

@@ -13,6 +13,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Finding, Motion, Worst, largest, worst_of
+from multimodal_to.auditing.integrator import integrator_findings
 from multimodal_to.auditing.properties import GAPS, PROPERTIES, check_allowances
 from multimodal_to.auditing.task import task_findings
 from multimodal_to.auditing.thrust import thrust_findings
@@ -88,32 +89,33 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         *_contacts(motion, scenario),
         *_limits(robot, trajectory),
         *thrust_findings(robot, trajectory),
+        *integrator_findings(motion),
         *(task_findings(motion, scenario) if scenario else ()),
     )
-    findings = _findings(worst, robot, scenario)
+    findings = _findings(worst, motion, scenario)
     return Audit(
         findings=findings,
         scenario=scenario,
         duration=trajectory.duration,
         airborne=max((end - start for start, end in phases), default=0.0),
         final_thrust_over_weight=float(motion.thrusts[:, -1, 2].sum() / robot.weight),
-        allowances_used=tuple(entry.name for entry in findings if entry.holds and not _within(entry, robot, scenario)),
+        allowances_used=tuple(entry.name for entry in findings if entry.holds and not _within(entry, motion, scenario)),
     )
 
 
-def _findings(worst: Sequence[Worst], robot: Robot, scenario: Scenario | None) -> tuple[Finding, ...]:
+def _findings(worst: Sequence[Worst], motion: Motion, scenario: Scenario | None) -> tuple[Finding, ...]:
     """Return the worst values with their limits.
 
     Args:
         worst: one for each property, in order.
-        robot: that a limit may depend on.
+        motion: whose robot and integration rule a limit may depend on.
         scenario: whose allowances may widen a limit.
 
     Raises:
         InputError: the scenario allows more of a property that is not judged.
     """
     if scenario:
-        check_allowances(robot, scenario)
+        check_allowances(motion.robot, scenario)
     allowances = scenario.allowances if scenario else {}
     return tuple(
         Finding(
@@ -122,21 +124,32 @@ def _findings(worst: Sequence[Worst], robot: Robot, scenario: Scenario | None) -
             unit=PROPERTIES[entry.name].unit,
             knot=entry.knot,
             body=entry.body,
-            limit=max(PROPERTIES[entry.name].limit_for(robot, scenario), allowances.get(entry.name, 0.0)),
+            limit=max(_limit(entry.name, motion, scenario), allowances.get(entry.name, 0.0)),
         )
         for entry in worst
     )
 
 
-def _within(finding: Finding, robot: Robot, scenario: Scenario | None) -> bool:
+def _within(finding: Finding, motion: Motion, scenario: Scenario | None) -> bool:
     """Return whether a finding holds without an allowance.
 
     Args:
         finding: with the widened limit.
-        robot: that the own limit may depend on.
+        motion: that the own limit may depend on.
         scenario: that the own limit may depend on.
     """
-    return finding.worst <= PROPERTIES[finding.name].limit_for(robot, scenario)
+    return finding.worst <= _limit(finding.name, motion, scenario)
+
+
+def _limit(name: str, motion: Motion, scenario: Scenario | None) -> float:
+    """Return a property's own limit.
+
+    Args:
+        name: of the property.
+        motion: with the robot and the integration rule.
+        scenario: that the limit may depend on.
+    """
+    return PROPERTIES[name].limit_for(motion.robot, scenario, motion.trajectory.rule)
 
 
 def _kinematics(motion: Motion) -> list[Worst]:

@@ -220,6 +220,43 @@ _ACTUATION_AND_CONTACT = (
     ),
 )
 
+_SECOND_ORDER = "chosen, at least twice what plans by a rule of order two with steps of 0.1 s are off"
+_BY_CONTROLS = (
+    "an accurate integrator that started from the file up to 2 √(L/g) before, under the file's contact forces, "
+    "throttles and joint motion"
+)
+_ORDER = (
+    Property(
+        name="CoM off integrator, stretch",
+        unit="m",
+        limit=0.05,
+        first_order_limit=0.2,
+        of_height=True,
+        reason=f"{_SECOND_ORDER}; one of order one is off by half an interval of each change of a force",
+        meaning=f"distance of the CoM at a knot from that of {_BY_CONTROLS}",
+    ),
+    Property(
+        name="base off integrator, stretch",
+        unit="rad",
+        limit=0.1,
+        first_order_limit=0.6,
+        reason=f"{_SECOND_ORDER}; one of order one is off by half an interval of each change of a moment",
+        meaning=f"angle of the base at a knot to that of {_BY_CONTROLS}",
+    ),
+    Property(
+        name="CoM off integrator, horizon",
+        unit="m",
+        limit=0.25,
+        first_order_limit=10.0,
+        of_height=True,
+        reason=f"{_SECOND_ORDER}; backward Euler has contact forces half an interval before thrusts, which leaves a "
+        "speed of ½ g Δt after a take-off: metres in ten seconds",
+        meaning="distance of the CoM at a knot from that of an accurate integrator that started at the first knot, "
+        "under the file's contact forces, thrusts and posture",
+    ),
+)
+"""Whether the motion is also right between the knots, which its rows at the knots cannot say."""
+
 
 def _com(when: str) -> Property:
     return Property(
@@ -384,7 +421,7 @@ _TASK = (
 )
 
 PROPERTIES: Mapping[str, Property] = MappingProxyType(
-    {entry.name: entry for entry in (*_PHYSICS, *_INTEGRATION, *_ACTUATION_AND_CONTACT, *_TASK)}
+    {entry.name: entry for entry in (*_PHYSICS, *_INTEGRATION, *_ACTUATION_AND_CONTACT, *_ORDER, *_TASK)}
 )
 """Every property by name, in the order of an audit's findings."""
 

@@ -8,6 +8,7 @@ from enum import Enum
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
+from multimodal_to.trajectory import rules
 
 
 class Judged(Enum):
@@ -44,17 +45,26 @@ class Property:
 
     name: str
     unit: str
-    limit: float  # largest value that holds, in `unit`; a share of m |g| where `of_weight`
+    limit: float  # largest value that holds, in `unit`; a share of m |g| where `of_weight`, of L where `of_height`
     reason: str  # where the limit comes from
     meaning: str  # what is compared with the limit
     judged: Judged = Judged.ALWAYS
     of_weight: bool = False
+    of_height: bool = False
     second_order_limit: float | None = None  # the limit under the second-order friction cone, where it is another one
+    first_order_limit: float | None = None  # the limit by an integration rule of order one, where it is another one
 
-    def limit_for(self, robot: Robot, scenario: Scenario | None) -> float:
-        """Return the limit in `unit` for a robot and, where it is known, its scenario."""
-        if self.of_weight:
-            return self.limit * robot.weight
+    def limit_for(self, robot: Robot, scenario: Scenario | None, rule: str = rules.STAGGERED) -> float:
+        """Return the limit in `unit`.
+
+        Args:
+            robot: whose weight or standing height the limit may be a share of.
+            scenario: which says the friction cone, where it is known.
+            rule: name of the motion's integration rule; every one with all at its knots is of order one.
+        """
+        limit = self.limit
+        if self.first_order_limit is not None and rules.all_at_knots(rule):
+            limit = self.first_order_limit
         if self.second_order_limit is not None and scenario and scenario.friction_cone is FrictionCone.SECOND_ORDER:
-            return self.second_order_limit
-        return self.limit
+            limit = self.second_order_limit
+        return limit * (robot.weight if self.of_weight else robot.standing_height if self.of_height else 1.0)
