@@ -18,11 +18,12 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
 from multimodal_to.files.reading import read_toml
 from multimodal_to.files.records import Records
-from multimodal_to.models import proportions
+from multimodal_to.models import capsule_pairs, proportions
+from multimodal_to.models.capsule import Capsule, CapsulePair, plume
 from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import Jet
 from multimodal_to.models.proportions import Gait
-from multimodal_to.models.robot_keys import RobotFile
+from multimodal_to.models.robot_keys import JetTable, RobotFile
 
 ROBOT_FILE = "robot.toml"
 _RECORDS = Records(what="the robot", error=ModelError)
@@ -71,6 +72,8 @@ class Robot:
     contact_reach: Array  # greatest distance of a contact point from the CoM in a plan, by world axis [m], (3,)
     jet_reach: Array  # greatest distance of a jet's frame from the CoM in a plan, by world axis [m], (3,)
     gait: Gait
+    link_capsules: tuple[Capsule, ...] = ()  # shapes of links; `capsules` has the plumes beside
+    ignored_pairs: frozenset[frozenset[str]] = frozenset()  # names of capsules that need not keep away from each other
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -108,6 +111,33 @@ class Robot:
         contacts = _offsets(self.kindyn, self.home, self.contact_names)
         jets = _offsets(self.kindyn, self.home, [jet.frame for jet in self.jets])
         return proportions.standing_height(contacts, jets)
+
+    @property
+    def capsules(self) -> tuple[Capsule, ...]:
+        """Return the shapes of links, then the plumes of the jets that are in use."""
+        return (*self.link_capsules, *(jet.plume for jet in self.jets if jet.plume is not None))
+
+    @cached_property
+    def _apart_at_home(self) -> dict[CapsulePair, float]:
+        pairs = capsule_pairs.apart_at_home(
+            self.kindyn, self.home.joint_positions, self.capsules, self.standing_height
+        )
+        return {pair: away for pair, away in pairs.items() if frozenset(c.name for c in pair) not in self.ignored_pairs}
+
+    @cached_property
+    def capsule_pairs(self) -> tuple[CapsulePair, ...]:
+        """Return the pairs of capsules that have to keep apart: `models.capsule_pairs.apart_at_home`."""
+        return tuple(self._apart_at_home)
+
+    @cached_property
+    def near_capsule_pairs(self) -> tuple[CapsulePair, ...]:
+        """Return those of `capsule_pairs` that a problem holds apart.
+
+        They are nearer than `models.capsule_pairs.NEAR` L at home, and can meet within the ranges of the joints.
+        """
+        nearest = capsule_pairs.NEAR * self.standing_height
+        pairs = [pair for pair, away in self._apart_at_home.items() if away < nearest]
+        return capsule_pairs.within_reach(self.kindyn, self.joint_limits.lower, self.joint_limits.upper, pairs)
 
     def with_jets(self, names: Sequence[str]) -> Robot:
         """Return the robot with only the jets of these names, in this order; with none it has none to use.
@@ -167,12 +197,12 @@ def _robot(file: RobotFile, folder: Path) -> Robot:
     contacts = tuple(
         ContactPoint(frame=frame, foot=foot) for foot, frames in file.contact.feet.items() for frame in frames
     )
-    jets = _jets(file)
+    home, links = _home(file), _link_capsules(file)
     _refuse_repeated("contact point", [point.frame for point in contacts])
-    _refuse_repeated("jet", [jet.name for jet in jets])
-    for frame in (*(point.frame for point in contacts), *(jet.frame for jet in jets)):
+    _refuse_repeated("jet", [jet.name for jet in file.jet])
+    for frame in (point.frame for point in (*contacts, *file.jet, *links)):
         kindyn.tree.frame(frame)
-    home = _home(file)
+    jets = _jets(file, kindyn, home)
     contact_reach, jet_reach, gait = _proportions(file, kindyn, home)
     return Robot(
         name=file.name,
@@ -187,6 +217,8 @@ def _robot(file: RobotFile, folder: Path) -> Robot:
         contact_reach=contact_reach,
         jet_reach=jet_reach,
         gait=gait,
+        link_capsules=links,
+        ignored_pairs=_ignored_pairs(file, (*links, *(jet.plume for jet in jets if jet.plume is not None))),
     )
 
 
@@ -222,7 +254,36 @@ def _home(file: RobotFile) -> Posture:
     )
 
 
-def _jets(file: RobotFile) -> tuple[Jet, ...]:
+def _link_capsules(file: RobotFile) -> tuple[Capsule, ...]:
+    return tuple(
+        Capsule(
+            name=entry.name or entry.link,
+            frame=entry.link,
+            start=np.array(entry.start),
+            end=np.array(entry.start if entry.end is None else entry.end),
+            radius=entry.radius,
+        )
+        for entry in file.capsule
+    )
+
+
+def _ignored_pairs(file: RobotFile, capsules: Sequence[Capsule]) -> frozenset[frozenset[str]]:
+    names = [capsule.name for capsule in capsules]
+    _refuse_repeated("capsule", names)
+    for name in (name for pair in file.collision.ignore for name in pair):
+        if name not in names:
+            raise ModelError(f"'collision.ignore': {unknown('capsule', name, names)}")
+    return frozenset(frozenset(pair) for pair in file.collision.ignore)
+
+
+def _jets(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> tuple[Jet, ...]:
+    """Return the jets with their plumes.
+
+    Args:
+        file: with their tables.
+        kindyn: kinematics of the robot, which are asked only for the length of a plume that is not stated.
+        home: the home posture.
+    """
     jets = []
     for entry in file.jet:
         if entry.model not in file.jet_models:
@@ -235,9 +296,23 @@ def _jets(file: RobotFile) -> tuple[Jet, ...]:
                 thrust_max=entry.thrust_max,
                 throttle_min=entry.throttle[0],
                 throttle_max=entry.throttle[1],
+                plume=_plume(entry, file, kindyn, home),
             )
         )
     return tuple(jets)
+
+
+def _plume(entry: JetTable, file: RobotFile, kindyn: KinDynComputations, home: Posture) -> Capsule | None:
+    if entry.plume_length is None and entry.plume_radius is None:
+        return None
+    length = _standing_height(file, kindyn, home) if entry.plume_length is None else entry.plume_length
+    radius = proportions.PLUME_RADIUS * length if entry.plume_radius is None else entry.plume_radius
+    return plume(f"{entry.name} plume", entry.frame, length, radius)
+
+
+def _standing_height(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> float:
+    contacts = _offsets(kindyn, home, [frame for frames in file.contact.feet.values() for frame in frames])
+    return proportions.standing_height(contacts, _offsets(kindyn, home, [jet.frame for jet in file.jet]))
 
 
 def _proportions(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> tuple[Array, Array, Gait]:
