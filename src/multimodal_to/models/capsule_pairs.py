@@ -45,12 +45,12 @@ def apart_at_home(
     pairs = [
         (one, other)
         for one, other in combinations(capsules, 2)
-        if not (one.plume and other.plume) and _joints_between(tree, one, other) >= FEWEST_JOINTS
+        if not (one.plume and other.plume) and joints_between(tree, one.frame, other.frame) >= FEWEST_JOINTS
     ]
-    distances = _distances(kindyn, home[:, None], pairs)[:, 0]
+    at_home = distances(kindyn, home[:, None], pairs)[:, 0]
     return {
         pair: float(distance)
-        for pair, distance in zip(pairs, distances, strict=True)
+        for pair, distance in zip(pairs, at_home, strict=True)
         if distance >= AT_HOME * standing_height
     }
 
@@ -67,16 +67,23 @@ def within_reach(
         pairs: to choose from.
     """
     postures = np.random.default_rng(0).uniform(lower, upper, (POSTURES, lower.size)).T
-    shares = (_distances(kindyn, postures, pairs) < 0).mean(axis=1)
+    shares = (distances(kindyn, postures, pairs) < 0).mean(axis=1)
     return tuple(pair for pair, share in zip(pairs, shares, strict=True) if share >= MEET)
 
 
-def _joints_between(tree: Tree, one: Capsule, other: Capsule) -> int:
-    paths = [set(tree.path(tree.frame(capsule.frame).body)) for capsule in (one, other)]
+def joints_between(tree: Tree, one: str, other: str) -> int:
+    """Return how many joints lie between the bodies of two frames.
+
+    Args:
+        tree: of the robot.
+        one: name of a frame.
+        other: name of another.
+    """
+    paths = [set(tree.path(tree.frame(frame).body)) for frame in (one, other)]
     return len(paths[0] ^ paths[1])
 
 
-def _distances(kindyn: KinDynComputations, postures: Array, pairs: Sequence[CapsulePair]) -> Array:
+def distances(kindyn: KinDynComputations, postures: Array, pairs: Sequence[CapsulePair]) -> Array:
     """Return the exact distances of pairs [m], (pairs, count).
 
     Args:
@@ -86,14 +93,14 @@ def _distances(kindyn: KinDynComputations, postures: Array, pairs: Sequence[Caps
     """
     count = postures.shape[1]
     poses = {
-        frame: _poses(kindyn, frame, postures)
+        frame: poses_in_base(kindyn, frame, postures)
         for frame in dict.fromkeys(capsule.frame for pair in pairs for capsule in pair)
     }
     found = [exact_distances(one, poses[one.frame], other, poses[other.frame]) for one, other in pairs]
     return np.array(found).reshape(len(pairs), count)
 
 
-def _poses(kindyn: KinDynComputations, frame: str, postures: Array) -> Array:
+def poses_in_base(kindyn: KinDynComputations, frame: str, postures: Array) -> Array:
     """Return base_H_frame in many postures, (count, 4, 4).
 
     Args:

@@ -119,9 +119,7 @@ class Robot:
 
     @cached_property
     def _apart_at_home(self) -> dict[CapsulePair, float]:
-        pairs = capsule_pairs.apart_at_home(
-            self.kindyn, self.home.joint_positions, self.capsules, self.standing_height
-        )
+        pairs = capsule_pairs.apart_at_home(self.kindyn, self.home.joint_positions, self.capsules, self.standing_height)
         return {pair: away for pair, away in pairs.items() if frozenset(c.name for c in pair) not in self.ignored_pairs}
 
     @cached_property
@@ -200,7 +198,8 @@ def _robot(file: RobotFile, folder: Path) -> Robot:
     home, links = _home(file), _link_capsules(file)
     _refuse_repeated("contact point", [point.frame for point in contacts])
     _refuse_repeated("jet", [jet.name for jet in file.jet])
-    for frame in (point.frame for point in (*contacts, *file.jet, *links)):
+    frames = [*(point.frame for point in contacts), *(jet.frame for jet in file.jet), *(link.frame for link in links)]
+    for frame in frames:
         kindyn.tree.frame(frame)
     jets = _jets(file, kindyn, home)
     contact_reach, jet_reach, gait = _proportions(file, kindyn, home)

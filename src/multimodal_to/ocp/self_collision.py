@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os.path
 from collections.abc import Sequence
 
 import casadi as cs
@@ -22,15 +21,15 @@ def link_distances(knot: Knot, parameters: Parameters) -> SX:
     has no rows. Each pair is seen from the last body that carries both, so that a row depends on the joints between
     the two alone.
     """
-    tree, pairs = knot.robot.kindyn.tree, knot.robot.near_capsule_pairs
+    tree = knot.robot.kindyn.tree
     joints = [joint_pose(body, knot.joint_positions) for body in tree.bodies[1:]]
     seen = dict[tuple[Capsule, tuple[int, ...]], Segment]()
     rows = []
-    for pair in pairs:
-        for key in (keys := _ways(tree, pair)):
+    for one, other in knot.robot.near_capsule_pairs:
+        keys = _ways(tree, (one, other))
+        for key in keys:
             if key not in seen:
                 seen[key] = _segment(tree, *key, joints)
-        (one, _), (other, _) = keys
         rows.append(smooth_distance(one, seen[keys[0]], other, seen[keys[1]]))
     return cs.vertcat(cs.SX(0, 1), *rows)
 
@@ -43,7 +42,7 @@ def link_pair_labels(parameters: Parameters) -> tuple[str, ...]:
 def _ways(tree: Tree, pair: Sequence[Capsule]) -> list[tuple[Capsule, tuple[int, ...]]]:
     """Return each capsule of a pair with the bodies that lead to it from the last one that carries both."""
     paths = [tree.path(tree.frame(capsule.frame).body) for capsule in pair]
-    shared = len(os.path.commonprefix(paths))
+    shared = len(set(paths[0]) & set(paths[1]))
     return [(capsule, tuple(path[shared:])) for capsule, path in zip(pair, paths, strict=True)]
 
 
