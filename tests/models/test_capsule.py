@@ -215,11 +215,40 @@ def test_neighbours_are_left_out_and_legs_and_jets_are_not(ironcub):
     assert not any("chest jet – left chest plume" in name for name in kept)  # its own
 
 
-def test_the_rows_are_few_and_alike_on_both_sides(ironcub):
-    near = ironcub.near_capsule_pairs
-    assert 20 <= len(near) <= 32
-    sets = {frozenset(entry.name for entry in pair) for pair in near}
+@pytest.mark.parametrize("stated", [True, False])
+def test_the_rows_are_few_and_alike_on_both_sides(ironcub, stated):
+    robot = ironcub if stated else replace(ironcub, held_pairs=frozenset())
+    sets = {frozenset(entry.name for entry in pair) for pair in robot.near_capsule_pairs}
     assert {frozenset(mirrored(name) for name in pair) for pair in sets} == sets
+    assert frozenset({"left foot", "right foot"}) in sets
+    assert len(sets) <= (25 if stated else 40)
+    if stated:
+        assert sets == ironcub.held_pairs
+
+
+def test_pairs_that_are_chosen_can_meet_and_are_near_at_home(ironcub):
+    robot = replace(ironcub, held_pairs=frozenset())
+    near, limits = robot.near_capsule_pairs, robot.joint_limits
+    postures = np.random.default_rng(8).uniform(limits.lower, limits.upper, (20_000, limits.lower.size)).T
+    assert (capsule_pairs.distances(robot.kindyn, postures, near) < 0).any(axis=1).all()
+    at_home = capsule_pairs.distances(robot.kindyn, robot.home.joint_positions[:, None], near)
+    assert at_home.max() < capsule_pairs.NEAR * robot.standing_height
+
+
+def test_a_pair_that_is_ignored_is_in_no_list(ironcub):
+    pair = frozenset({"left foot", "right foot"})
+    robot = replace(ironcub, held_pairs=frozenset(), ignored_pairs=frozenset({pair}))
+    for pairs in (robot.capsule_pairs, robot.near_capsule_pairs):
+        assert "left foot – right foot" not in names(pairs)
+    assert len(robot.capsule_pairs) == len(ironcub.capsule_pairs) - 1
+
+
+def test_neighbours_cannot_be_held_apart(ironcub):
+    robot = replace(ironcub, held_pairs=frozenset({frozenset({"left thigh", "left shank"})}))
+    with pytest.raises(
+        ModelError, match="the capsules left shank, left thigh cannot be held apart: they are neighbours"
+    ):
+        _ = robot.near_capsule_pairs
 
 
 def test_the_plumes_are_those_of_the_jets_in_use(ironcub):

@@ -100,12 +100,9 @@ def test_a_robot_is_loaded_from_its_folder(folder, ironcub):
         ('link = "l_upper_leg"', 'link = "l_uper_leg"', "unknown frame 'l_uper_leg'; did you mean 'l_upper_leg'"),
         ('name = "left thigh"', 'name = "left foot"', "capsule given twice: left foot"),
         ("plume_length = 0.5", "plume_length = 0", "'jet[0]': plume_length is 0.0; expected a positive number"),
-        ('["left upper arm", "left thigh"]', '["left upper arm", "left tigh"]', "unknown capsule 'left tigh'; did you"),
-        (
-            '["left upper arm", "left thigh"]',
-            '["left upper arm"]',
-            "'collision.ignore[2]' is ['left upper arm']; expected",
-        ),
+        ('["left forearm", "left thigh"]', '["left forearm", "left tigh"]', "unknown capsule 'left tigh'; did you"),
+        ("ignore = []", 'ignore = [["head"]]', "'collision.ignore[0]' is ['head']; expected a list of 2"),
+        ("ignore = []", 'ignore = [["left tigh", "head"]]', "'collision.ignore': unknown capsule 'left tigh'"),
         ("[joints]", "[joints", "not valid TOML"),
     ],
 )

@@ -27,6 +27,8 @@ from multimodal_to.models.robot_keys import JetTable, RobotFile
 
 ROBOT_FILE = "robot.toml"
 _RECORDS = Records(what="the robot", error=ModelError)
+NamePairs = frozenset[frozenset[str]]
+"""Pairs of capsules by their names."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,7 +75,8 @@ class Robot:
     jet_reach: Array  # greatest distance of a jet's frame from the CoM in a plan, by world axis [m], (3,)
     gait: Gait
     link_capsules: tuple[Capsule, ...] = ()  # shapes of links; `capsules` has the plumes beside
-    ignored_pairs: frozenset[frozenset[str]] = frozenset()  # names of capsules that need not keep away from each other
+    ignored_pairs: NamePairs = frozenset()  # of capsules that may come as near as they like
+    held_pairs: NamePairs = frozenset()  # of capsules that a problem holds apart; empty: `near_capsule_pairs` chooses
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -131,11 +134,28 @@ class Robot:
     def near_capsule_pairs(self) -> tuple[CapsulePair, ...]:
         """Return those of `capsule_pairs` that a problem holds apart.
 
-        They are nearer than `models.capsule_pairs.NEAR` L at home, and can meet within the ranges of the joints.
+        They are `held_pairs`. A robot that does not say them has those that are nearer than `models.capsule_pairs.NEAR`
+        L at home, and can meet within the ranges of the joints.
+
+        Raises:
+            ModelError: two capsules of `held_pairs` are neighbours, or touch at home, or are ignored.
         """
+        if self.held_pairs:
+            return self._stated_pairs()
         nearest = capsule_pairs.NEAR * self.standing_height
         pairs = [pair for pair, away in self._apart_at_home.items() if away < nearest]
         return capsule_pairs.within_reach(self.kindyn, self.joint_limits.lower, self.joint_limits.upper, pairs)
+
+    def _stated_pairs(self) -> tuple[CapsulePair, ...]:
+        by_names = {frozenset(capsule.name for capsule in pair): pair for pair in self.capsule_pairs}
+        present = {capsule.name for capsule in self.capsules}  # not the plumes of jets that are not in use
+        for names in self.held_pairs:
+            if names <= present and names not in by_names:
+                raise ModelError(
+                    f"the capsules {listed(sorted(names))} cannot be held apart: they are neighbours in the tree, or "
+                    "touch at home, or are ignored"
+                )
+        return tuple(pair for names, pair in by_names.items() if names in self.held_pairs)
 
     def with_jets(self, names: Sequence[str]) -> Robot:
         """Return the robot with only the jets of these names, in this order; with none it has none to use.
@@ -217,7 +237,8 @@ def _robot(file: RobotFile, folder: Path) -> Robot:
         jet_reach=jet_reach,
         gait=gait,
         link_capsules=links,
-        ignored_pairs=_ignored_pairs(file, (*links, *(jet.plume for jet in jets if jet.plume is not None))),
+        ignored_pairs=_named_pairs("ignore", file.collision.ignore, links, jets),
+        held_pairs=_named_pairs("hold_apart", file.collision.hold_apart, links, jets),
     )
 
 
@@ -266,13 +287,23 @@ def _link_capsules(file: RobotFile) -> tuple[Capsule, ...]:
     )
 
 
-def _ignored_pairs(file: RobotFile, capsules: Sequence[Capsule]) -> frozenset[frozenset[str]]:
-    names = [capsule.name for capsule in capsules]
+def _named_pairs(
+    key: str, pairs: Sequence[tuple[str, str]], links: Sequence[Capsule], jets: Sequence[Jet]
+) -> NamePairs:
+    """Return the pairs of a key of `[collision]`.
+
+    Args:
+        key: of the table.
+        pairs: as the file has them.
+        links: the capsules of links.
+        jets: whose plumes are capsules too.
+    """
+    names = [capsule.name for capsule in (*links, *(jet.plume for jet in jets if jet.plume is not None))]
     _refuse_repeated("capsule", names)
-    for name in (name for pair in file.collision.ignore for name in pair):
+    for name in (name for pair in pairs for name in pair):
         if name not in names:
-            raise ModelError(f"'collision.ignore': {unknown('capsule', name, names)}")
-    return frozenset(frozenset(pair) for pair in file.collision.ignore)
+            raise ModelError(f"'collision.{key}': {unknown('capsule', name, names)}")
+    return frozenset(frozenset(pair) for pair in pairs)
 
 
 def _jets(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> tuple[Jet, ...]:

@@ -149,9 +149,11 @@ class CapsuleTable:
 class CollisionTable:
     """The table `[collision]`."""
 
+    hold_apart: tuple[tuple[str, str], ...] = ()
+    """Pairs of capsules that a problem holds apart, by their names; the plume of a jet is called as the jet, with
+    `plume` after it. Where there are none, they are chosen by the home posture and the joints' ranges."""
     ignore: tuple[tuple[str, str], ...] = ()
-    """Pairs of capsules that may come as near as they like, by their names; the plume of a jet is called as the jet,
-    and `plume` after it."""
+    """Pairs that may come as near as they like, in a problem and for the audit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,7 +183,7 @@ class RobotFile:
     capsule: tuple[CapsuleTable, ...] = ()
     """Shapes of links, which keep away from each other; without any, links may go through each other."""
     collision: CollisionTable = field(default_factory=CollisionTable)
-    """What capsules need not keep away from each other."""
+    """Which capsules keep away from each other."""
 
 
 def robot_keys() -> tuple[Key, ...]:
