@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -129,6 +130,6 @@ def test_the_meshes_that_the_robot_wears_tell_of_crossed_legs_too(ironcub, stand
 
 
 def test_without_the_library_a_sentence_says_what_to_install(ironcub, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "coal", None)
+    monkeypatch.setitem(sys.modules, "coal", None)
     with pytest.raises(OutputError, match=r"need coal: pip install 'multimodal-to\[solids\]'"):
         urdf_solids(ironcub)
