@@ -134,17 +134,17 @@ CHANGES = {
 def test_the_table_says_which_properties_are_judged_and_in_which_order(ironcub, take_off, change):
     scenario = replace(scenarios.take_off(), **change)
     found = [finding.name for finding in audit(ironcub, take_off.trajectory, scenario).findings]
-    assert found == judged(scenario, has_jets=True)
+    assert found == judged(scenario, ironcub)
 
 
 def test_every_property_of_the_table_is_judged_for_some_task(ironcub, take_off):
     seen = set()
     for change in CHANGES.values():
-        seen |= set(judged(replace(scenarios.take_off(), **change), has_jets=True))
+        seen |= set(judged(replace(scenarios.take_off(), **change), ironcub))
     assert seen == set(PROPERTIES)
     physics = [finding.name for finding in audit(ironcub, replace(take_off.trajectory, scenario_json="")).findings]
-    assert physics == judged(None, has_jets=True)
-    assert set(physics) - set(judged(None, has_jets=False)) == {
+    assert physics == judged(None, ironcub)
+    assert set(physics) - set(judged(None, ironcub.with_jets(()))) == {
         "thrust off CVODES, interval",
         "thrust off CVODES, horizon",
     }

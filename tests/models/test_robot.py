@@ -152,6 +152,13 @@ def test_every_motor_of_the_ironcub_has_a_limit_and_holds_the_robot_up_by_its_je
         ("jets = [0.5, 0.5, 0.5]", "jet = [0.5, 0.5, 0.5]", "unknown key 'reach.jet'; did you mean 'reach.jets'"),
         ("lift = 0.04", "lift = 0", "'gait': lift is 0.0; expected a positive number"),
         ("swing = 0.65", "swing = 65", "'gait': swing is 65.0; expected a number above 0 and at most 1"),
+        ("radius = 0.064", "radius = -1", "'capsule[0]': radius is -1.0; expected a positive number"),
+        ('link = "l_upper_leg"', 'link = "l_uper_leg"', "unknown frame 'l_uper_leg'; did you mean 'l_upper_leg'"),
+        ('name = "left thigh"', 'name = "left foot"', "capsule given twice: left foot"),
+        ("plume_length = 0.5", "plume_length = 0", "'jet[0]': plume_length is 0.0; expected a positive number"),
+        ('["left forearm", "left thigh"]', '["left forearm", "left tigh"]', "unknown capsule 'left tigh'; did you"),
+        ("ignore = []", 'ignore = [["head"]]', "'collision.ignore[0]' is ['head']; expected a list of 2"),
+        ("ignore = []", 'ignore = [["left tigh", "head"]]', "'collision.ignore': unknown capsule 'left tigh'"),
         ("[joints]", "[joints", "not valid TOML"),
     ],
 )

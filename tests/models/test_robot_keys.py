@@ -69,7 +69,7 @@ def leaves(table, prefix=""):
                 yield from leaves(entry, f"{key}.<name>.")
         elif isinstance(value, dict):
             yield from leaves(value, f"{key}.")
-        elif isinstance(value, list) and isinstance(value[0], dict):
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
             for entry in value:
                 yield from leaves(entry, f"{key}[].")
 
@@ -99,5 +99,29 @@ def test_a_key_is_missed_where_it_is_required_and_only_there(key, load_changed):
     elif key.name == "jet_models":
         with pytest.raises(ModelError, match="unknown jet model 'P160'"):
             load_changed(table)
+    elif key.name in ("capsule", "jet"):  # whose capsules the table `collision` names
+        with pytest.raises(ModelError, match=r"'collision.hold_apart': unknown capsule"):
+            load_changed(table)
     else:
         assert load_changed(table).name == "ironcub"
+
+
+def test_a_robot_without_capsules_and_plumes_has_none(load_changed):
+    table = copy()
+    del table["capsule"], table["collision"]
+    for jet in table["jet"]:
+        del jet["plume_length"], jet["plume_radius"]
+    robot = load_changed(table)
+    assert robot.capsules == robot.capsule_pairs == robot.near_capsule_pairs == ()
+
+
+@pytest.mark.parametrize(("left_out", "length", "radius"), [("plume_length", None, 0.05), ("plume_radius", 0.5, 0.05)])
+def test_what_a_plume_does_not_state_follows_from_the_other_and_from_the_size_of_the_robot(
+    load_changed, left_out, length, radius
+):
+    table = copy()
+    del table["jet"][0][left_out]
+    robot = load_changed(table)
+    plume = robot.jets[0].plume
+    assert plume.end[2] + plume.radius == pytest.approx(length or robot.standing_height)
+    assert plume.radius == pytest.approx(radius)

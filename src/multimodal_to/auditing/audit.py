@@ -15,6 +15,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Finding, Motion, Worst, largest, worst_of
 from multimodal_to.auditing.integrator import integrator_findings
 from multimodal_to.auditing.properties import GAPS, PROPERTIES, check_allowances
+from multimodal_to.auditing.self_collision import link_findings
 from multimodal_to.auditing.task import task_findings
 from multimodal_to.auditing.thrust import thrust_findings
 from multimodal_to.errors import InputError, unknown
@@ -90,6 +91,7 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         *_limits(robot, trajectory),
         *thrust_findings(robot, trajectory),
         *integrator_findings(motion),
+        *link_findings(robot, trajectory),
         *(task_findings(motion, scenario) if scenario else ()),
     )
     findings = _findings(worst, motion, scenario)

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from multimodal_to.auditing.property import Judged, Property
+from multimodal_to.auditing.self_collision import SELF_COLLISION
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Scenario
@@ -421,14 +422,17 @@ _TASK = (
 )
 
 PROPERTIES: Mapping[str, Property] = MappingProxyType(
-    {entry.name: entry for entry in (*_PHYSICS, *_INTEGRATION, *_ACTUATION_AND_CONTACT, *_ORDER, *_TASK)}
+    {
+        entry.name: entry
+        for entry in (*_PHYSICS, *_INTEGRATION, *_ACTUATION_AND_CONTACT, *_ORDER, *SELF_COLLISION, *_TASK)
+    }
 )
 """Every property by name, in the order of an audit's findings."""
 
 
-def judged(scenario: Scenario | None, has_jets: bool) -> list[str]:
-    """Return the names of the properties that a motion is judged by, in the order of the table."""
-    return [name for name, entry in PROPERTIES.items() if entry.judged.applies(scenario, has_jets)]
+def judged(scenario: Scenario | None, robot: Robot) -> list[str]:
+    """Return the names of the properties that a motion of a robot is judged by, in the order of the table."""
+    return [name for name, entry in PROPERTIES.items() if entry.judged.applies(scenario, robot)]
 
 
 def check_allowances(robot: Robot, scenario: Scenario) -> None:
@@ -441,7 +445,7 @@ def check_allowances(robot: Robot, scenario: Scenario) -> None:
     Raises:
         InputError: no property of the audit has the name of an allowance.
     """
-    known = judged(scenario, has_jets=bool(robot.jets))
+    known = judged(scenario, robot)
     for name in scenario.allowances:
         if name not in known:
             raise InputError(unknown("property to allow more of", name, known))

@@ -16,6 +16,7 @@ class Judged(Enum):
 
     ALWAYS = "always"
     WITH_JETS = "the motion has jets"
+    WITH_CAPSULES = "the robot has capsules"
     WITH_SCENARIO = "the scenario is known"
     WITH_MID_HEIGHT = "the scenario has a `mid_height_min`"
     STANDING_START = "the scenario starts standing"
@@ -24,10 +25,15 @@ class Judged(Enum):
     STANDING_END = "the scenario ends standing"
     HOVERING_END = "the scenario ends in a hover"
 
-    def applies(self, scenario: Scenario | None, has_jets: bool) -> bool:
-        """Return whether a motion is judged; without a scenario only its physics is."""
-        if self in (Judged.ALWAYS, Judged.WITH_JETS) or scenario is None:
-            return self is Judged.ALWAYS or (self is Judged.WITH_JETS and has_jets)
+    def applies(self, scenario: Scenario | None, robot: Robot) -> bool:
+        """Return whether a motion of a robot is judged; without a scenario only its physics is."""
+        physics = {
+            Judged.ALWAYS: True,
+            Judged.WITH_JETS: bool(robot.jets),
+            Judged.WITH_CAPSULES: bool(robot.capsules),
+        }
+        if self in physics or scenario is None:
+            return physics.get(self, False)
         return {
             Judged.WITH_SCENARIO: True,
             Judged.WITH_MID_HEIGHT: scenario.mid_height_min is not None,

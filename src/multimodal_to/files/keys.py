@@ -112,7 +112,11 @@ def _kind(kind: Any, unions: Unions) -> str:
     if get_origin(kind) is tuple:
         members = get_args(kind)
         inner = _kind(members[0], unions)
-        several = inner.replace("list of", "lists of") if inner.startswith("list") else f"{inner}s"
+        several = f"{inner}s"
+        if inner.startswith("list"):
+            several = inner.replace("list of", "lists of")
+        elif inner.startswith(tuple(_COUNTS.values())):
+            several = f"lists of {inner}"
         return f"list of {several}" if members[-1] is Ellipsis else f"{_COUNTS[len(members)]} {several}"
     if get_origin(kind) is Mapping:
         return f"table of names, each with a {_kind(get_args(kind)[1], unions)}"

@@ -12,6 +12,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import SX
 from multimodal_to.errors import InputError
+from multimodal_to.models.capsule import Capsule
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,3 +87,4 @@ class Jet:
     thrust_max: float  # [N]
     throttle_min: float  # [%]
     throttle_max: float  # [%]
+    plume: Capsule | None = None  # its exhaust, along +z of `frame`

@@ -20,14 +20,17 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
 from multimodal_to.files.reading import read_toml
 from multimodal_to.files.records import Records
-from multimodal_to.models import proportions
+from multimodal_to.models import capsule_pairs, proportions
+from multimodal_to.models.capsule import Capsule, CapsulePair, plume
 from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import Jet
 from multimodal_to.models.proportions import Gait
-from multimodal_to.models.robot_keys import JointTable, RobotFile
+from multimodal_to.models.robot_keys import JetTable, JointTable, RobotFile
 
 ROBOT_FILE = "robot.toml"
 _RECORDS = Records(what="the robot", error=ModelError)
+NamePairs = frozenset[frozenset[str]]
+"""Pairs of capsules by their names."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,6 +76,9 @@ class Robot:
     contact_reach: Array  # greatest distance of a contact point from the CoM in a plan, by world axis [m], (3,)
     jet_reach: Array  # greatest distance of a jet's frame from the CoM in a plan, by world axis [m], (3,)
     gait: Gait
+    link_capsules: tuple[Capsule, ...] = ()  # shapes of links; `capsules` has the plumes beside
+    ignored_pairs: NamePairs = frozenset()  # of capsules that may come as near as they like
+    held_pairs: NamePairs = frozenset()  # of capsules that a problem holds apart; empty: `near_capsule_pairs` chooses
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -120,6 +126,48 @@ class Robot:
     def rate_unit(self) -> float:
         """Return √(|g| / L) [1/s], the robot's own unit of rates; a pendulum of its height has this frequency."""
         return math.sqrt(float(np.linalg.norm(self.gravity)) / self.standing_height)
+
+    @property
+    def capsules(self) -> tuple[Capsule, ...]:
+        """Return the shapes of links, then the plumes of the jets that are in use."""
+        return (*self.link_capsules, *(jet.plume for jet in self.jets if jet.plume is not None))
+
+    @cached_property
+    def _apart_at_home(self) -> dict[CapsulePair, float]:
+        pairs = capsule_pairs.apart_at_home(self.kindyn, self.home.joint_positions, self.capsules, self.standing_height)
+        return {pair: away for pair, away in pairs.items() if frozenset(c.name for c in pair) not in self.ignored_pairs}
+
+    @cached_property
+    def capsule_pairs(self) -> tuple[CapsulePair, ...]:
+        """Return the pairs of capsules that have to keep apart: `models.capsule_pairs.apart_at_home`."""
+        return tuple(self._apart_at_home)
+
+    @cached_property
+    def near_capsule_pairs(self) -> tuple[CapsulePair, ...]:
+        """Return those of `capsule_pairs` that a problem holds apart.
+
+        They are `held_pairs`. A robot that does not say them has those that are nearer than `models.capsule_pairs.NEAR`
+        L at home, and can meet within the ranges of the joints.
+
+        Raises:
+            ModelError: two capsules of `held_pairs` are neighbours, or touch at home, or are ignored.
+        """
+        if self.held_pairs:
+            return self._stated_pairs()
+        nearest = capsule_pairs.NEAR * self.standing_height
+        pairs = [pair for pair, away in self._apart_at_home.items() if away < nearest]
+        return capsule_pairs.within_reach(self.kindyn, self.joint_limits.lower, self.joint_limits.upper, pairs)
+
+    def _stated_pairs(self) -> tuple[CapsulePair, ...]:
+        by_names = {frozenset(capsule.name for capsule in pair): pair for pair in self.capsule_pairs}
+        present = {capsule.name for capsule in self.capsules}  # not the plumes of jets that are not in use
+        for names in self.held_pairs:
+            if names <= present and names not in by_names:
+                raise ModelError(
+                    f"the capsules {listed(sorted(names))} cannot be held apart: they are neighbours in the tree, or "
+                    "touch at home, or are ignored"
+                )
+        return tuple(pair for names, pair in by_names.items() if names in self.held_pairs)
 
     def with_jets(self, names: Sequence[str]) -> Robot:
         """Return the robot with only the jets of these names, in this order; with none it has none to use.
@@ -179,12 +227,13 @@ def _robot(file: RobotFile, folder: Path) -> Robot:
     contacts = tuple(
         ContactPoint(frame=frame, foot=foot) for foot, frames in file.contact.feet.items() for frame in frames
     )
-    jets = _jets(file)
+    home, links = _home(file), _link_capsules(file)
     _refuse_repeated("contact point", [point.frame for point in contacts])
-    _refuse_repeated("jet", [jet.name for jet in jets])
-    for frame in (*(point.frame for point in contacts), *(jet.frame for jet in jets)):
+    _refuse_repeated("jet", [jet.name for jet in file.jet])
+    frames = [*(point.frame for point in contacts), *(jet.frame for jet in file.jet), *(link.frame for link in links)]
+    for frame in frames:
         kindyn.tree.frame(frame)
-    home = _home(file)
+    jets = _jets(file, kindyn, home)
     contact_reach, jet_reach, gait = _proportions(file, kindyn, home)
     return Robot(
         name=file.name,
@@ -199,6 +248,9 @@ def _robot(file: RobotFile, folder: Path) -> Robot:
         contact_reach=contact_reach,
         jet_reach=jet_reach,
         gait=gait,
+        link_capsules=links,
+        ignored_pairs=_named_pairs("ignore", file.collision.ignore, links, jets),
+        held_pairs=_named_pairs("hold_apart", file.collision.hold_apart, links, jets),
     )
 
 
@@ -248,7 +300,46 @@ def _home(file: RobotFile) -> Posture:
     )
 
 
-def _jets(file: RobotFile) -> tuple[Jet, ...]:
+def _link_capsules(file: RobotFile) -> tuple[Capsule, ...]:
+    return tuple(
+        Capsule(
+            name=entry.name or entry.link,
+            frame=entry.link,
+            start=np.array(entry.start),
+            end=np.array(entry.start if entry.end is None else entry.end),
+            radius=entry.radius,
+        )
+        for entry in file.capsule
+    )
+
+
+def _named_pairs(
+    key: str, pairs: Sequence[tuple[str, str]], links: Sequence[Capsule], jets: Sequence[Jet]
+) -> NamePairs:
+    """Return the pairs of a key of `[collision]`.
+
+    Args:
+        key: of the table.
+        pairs: as the file has them.
+        links: the capsules of links.
+        jets: whose plumes are capsules too.
+    """
+    names = [capsule.name for capsule in (*links, *(jet.plume for jet in jets if jet.plume is not None))]
+    _refuse_repeated("capsule", names)
+    for name in (name for pair in pairs for name in pair):
+        if name not in names:
+            raise ModelError(f"'collision.{key}': {unknown('capsule', name, names)}")
+    return frozenset(frozenset(pair) for pair in pairs)
+
+
+def _jets(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> tuple[Jet, ...]:
+    """Return the jets with their plumes.
+
+    Args:
+        file: with their tables.
+        kindyn: kinematics of the robot, which are asked only for the length of a plume that is not stated.
+        home: the home posture.
+    """
     jets = []
     for entry in file.jet:
         if entry.model not in file.jet_models:
@@ -261,9 +352,23 @@ def _jets(file: RobotFile) -> tuple[Jet, ...]:
                 thrust_max=entry.thrust_max,
                 throttle_min=entry.throttle[0],
                 throttle_max=entry.throttle[1],
+                plume=_plume(entry, file, kindyn, home),
             )
         )
     return tuple(jets)
+
+
+def _plume(entry: JetTable, file: RobotFile, kindyn: KinDynComputations, home: Posture) -> Capsule | None:
+    if entry.plume_length is None and entry.plume_radius is None:
+        return None
+    length = _standing_height(file, kindyn, home) if entry.plume_length is None else entry.plume_length
+    radius = proportions.PLUME_RADIUS * length if entry.plume_radius is None else entry.plume_radius
+    return plume(f"{entry.name} plume", entry.frame, length, radius)
+
+
+def _standing_height(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> float:
+    contacts = _offsets(kindyn, home, [frame for frames in file.contact.feet.values() for frame in frames])
+    return proportions.standing_height(contacts, _offsets(kindyn, home, [jet.frame for jet in file.jet]))
 
 
 def _proportions(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> tuple[Array, Array, Gait]:

@@ -116,11 +116,50 @@ class JetTable:
     """Greatest thrust [N]."""
     throttle: tuple[float, float]
     """Least and greatest throttle [%]."""
+    plume_length: float | None = None
+    """How far the exhaust reaches from the frame's origin, along +z of the frame [m]. A jet has a plume where this or
+    `plume_radius` is stated. Where only that one is, the length is L: heat and size of a jet grow with its robot."""
+    plume_radius: float | None = None
+    """Radius of the exhaust [m]. Where only `plume_length` is stated, it is a tenth of it, as wide as a free round jet
+    gets over its length."""
 
     def __post_init__(self) -> None:
         _positive("thrust_max", self.thrust_max)
+        for name, size in (("plume_length", self.plume_length), ("plume_radius", self.plume_radius)):
+            if size is not None:
+                _positive(name, size)
         if not self.throttle[0] < self.throttle[1]:
             raise InputError(f"throttle is {shown(list(self.throttle))}; expected two numbers that rise")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CapsuleTable:
+    """One of the tables `[[capsule]]`."""
+
+    link: str
+    """The link or frame that it is fixed in; a link may have several."""
+    start: Vector3
+    """One end of its segment, in the frame of `link` [m]."""
+    end: Vector3 | None = None
+    """The other end [m]. Where there is none, the capsule is a sphere."""
+    radius: float
+    """Radius around the segment [m]."""
+    name: str | None = None
+    """What the capsule is called; where there is none, as its `link`."""
+
+    def __post_init__(self) -> None:
+        _positive("radius", self.radius)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CollisionTable:
+    """The table `[collision]`."""
+
+    hold_apart: tuple[tuple[str, str], ...] = ()
+    """Pairs of capsules that a problem holds apart, by their names; the plume of a jet is called as the jet, with
+    `plume` after it. Where there are none, they are chosen by the home posture and the joints' ranges."""
+    ignore: tuple[tuple[str, str], ...] = ()
+    """Pairs that may come as near as they like, in a problem and for the audit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,6 +186,10 @@ class RobotFile:
     """The jets, in their order."""
     jet_models: Mapping[str, JetModel] = field(default_factory=dict)
     """Thrust dynamics of sorts of jets, by name."""
+    capsule: tuple[CapsuleTable, ...] = ()
+    """Shapes of links, which keep away from each other; without any, links may go through each other."""
+    collision: CollisionTable = field(default_factory=CollisionTable)
+    """Which capsules keep away from each other."""
 
 
 def robot_keys() -> tuple[Key, ...]:
