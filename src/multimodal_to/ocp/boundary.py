@@ -67,7 +67,7 @@ def _set_end(bounds: Bounds, scenario: Scenario, rule: str) -> None:
     if scenario.terminal is Terminal.HOVER:
         for knot in (last - 1, last):
             fix("thrust_rate", knot, 0.0)
-        # Forces of intervals: the last two meet at a knot where the robot rests.
-        for knot in (last - 1, last) if rules.instant(rule, "contact_forces") else (last,):
+        # Where velocities are between knots, the forces of the knot before the last one make the last velocity.
+        for knot in (last - 1, last) if rules.instant(rule, "com_velocity") else (last,):
             fix("contact_forces", knot, 0.0, within=_NO_FORCE)
         fix("base_quaternion_xyzw", last, _ORIENTATION, within=_UPRIGHT)

@@ -72,10 +72,19 @@ def complementarity(knot: Knot, parameters: Parameters) -> SX:
 
 
 def complementarity_before(interval: Interval, parameters: Parameters) -> SX:
-    """d(p_i) n·f_i⁺ ≤ ε_n: a force that belongs to an interval needs its point on the ground at the start as well."""
+    """d(p_i) n·f_i⁺ ≤ ε_n: a force acts from half an interval before its knot on, when its point stands already."""
     products = [
         contact.complementarity(parameters.surface, point, force)
         for point, force in zip(interval.start.points, interval.end.forces, strict=True)
+    ]
+    return cs.vertcat(*products)
+
+
+def complementarity_after(interval: Interval, parameters: Parameters) -> SX:
+    """d(p_i⁺) n·f_i ≤ ε_n: a force acts until half an interval after its knot, when its point still stands."""
+    products = [
+        contact.complementarity(parameters.surface, point, force)
+        for point, force in zip(interval.end.points, interval.start.forces, strict=True)
     ]
     return cs.vertcat(*products)
 
@@ -151,8 +160,16 @@ def thrust_dynamics(interval: Interval, parameters: Parameters) -> SX:
 
 
 def sliding(interval: Interval, parameters: Parameters) -> SX:
-    """|t·(p_i⁺ − p_i)| n·f_i⁺ ≤ ε_t (eq. 21), with the force that acts over the interval."""
-    forces = cs.vertsplit(interval.over(lambda knot: knot.contact_forces), 3)
+    """|t·(p_i⁺ − p_i)| n·f_i⁺ ≤ ε_t (eq. 21)."""
+    return _slips(interval, interval.end.forces, parameters)
+
+
+def sliding_after(interval: Interval, parameters: Parameters) -> SX:
+    """|t·(p_i⁺ − p_i)| n·f_i ≤ ε_t: a point stays where it is until half an interval after the knot of its force."""
+    return _slips(interval, interval.start.forces, parameters)
+
+
+def _slips(interval: Interval, forces: list[SX], parameters: Parameters) -> SX:
     products = [
         contact.sliding(parameters.surface, after, force, after - before)
         for before, after, force in zip(interval.start.points, interval.end.points, forces, strict=True)

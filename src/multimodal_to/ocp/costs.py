@@ -10,6 +10,9 @@ from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 
+SKIM_HEIGHT = 0.02
+"""δ: height at which a speed along the ground counts half, as a share of the standing height L [1]."""
+
 
 def com_velocity(knot: Knot, parameters: Parameters) -> SX:
     """ẋ."""
@@ -42,8 +45,8 @@ def joint_velocities(knot: Knot, parameters: Parameters) -> SX:
 
 
 def posture(knot: Knot, parameters: Parameters) -> SX:
-    """s − s̄, with the posture in which the robot stands as s̄ (`Parameters.standing`)."""
-    return knot.joint_positions - cs.DM(parameters.standing.joint_positions)
+    """s − s̄, with the posture in which the robot stands at the end, or else at the start, as s̄ (`Parameters.target`)."""
+    return knot.joint_positions - cs.DM(parameters.target.joint_positions)
 
 
 def base_orientation(knot: Knot, parameters: Parameters) -> SX:
@@ -80,3 +83,32 @@ def throttle(knot: Knot, parameters: Parameters) -> SX:
 def throttle_rate(interval: Interval, parameters: Parameters) -> SX:
     """u̇ = (u⁺ − u) / Δt."""
     return interval.rate(lambda knot: knot.throttle)
+
+
+def joint_accelerations(interval: Interval, parameters: Parameters) -> SX:
+    """s̈ = (ṡ⁺ − ṡ) / Δt."""
+    return interval.rate(lambda knot: knot.joint_velocities)
+
+
+def foot_tilt(knot: Knot, parameters: Parameters) -> SX:
+    """d(p_i) less the mean of the foot's points, over L: zero for a sole that is level with the ground."""
+    feet = [contact.foot for contact in knot.robot.contacts]
+    heights = [parameters.surface.distance(point) for point in knot.points]
+    means = {
+        foot: sum(d for d, name in zip(heights, feet, strict=True) if name == foot) / feet.count(foot) for foot in feet
+    }
+    rows = [(d - means[foot]) / knot.robot.standing_height for d, foot in zip(heights, feet, strict=True)]
+    return cs.vertcat(cs.SX(0, 1), *rows)
+
+
+def skimming(interval: Interval, parameters: Parameters) -> SX:
+    """Speed of each contact point along the ground in √(g L), the less the higher it is: t·Δp / Δt / √(1 + (d / δ)²).
+
+    δ is `SKIM_HEIGHT`. A foot that swings is lifted by it, and one that stands or hovers is not moved.
+    """
+    robot, rows = parameters.robot, []
+    for before, after in zip(interval.start.points, interval.end.points, strict=True):
+        along = parameters.surface.tangents(after).T @ (after - before) / (interval.duration * robot.speed_unit)
+        height = 0.5 * (parameters.surface.distance(before) + parameters.surface.distance(after))
+        rows.append(along / cs.sqrt(1 + (height / (SKIM_HEIGHT * robot.standing_height)) ** 2))
+    return cs.vertcat(cs.SX(0, 1), *rows)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 
 from multimodal_to.errors import FormulationError, listed, shown, unknown
 from multimodal_to.ocp import margins, paper
-from multimodal_to.ocp.integration import BACKWARD_EULER, STAGGERED, IntegrationRule
+from multimodal_to.ocp.integration import BACKWARD_EULER, LEAPFROG, IntegrationRule
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.terms import Constraint, Cost, Term
 from multimodal_to.ocp.variables import INTERVAL_SCALE, VARIABLES, Variable
@@ -55,12 +55,12 @@ class Formulation:
     def executable(cls) -> Formulation:
         """Return the problem whose plans a robot can carry out, which `build` takes by default.
 
-        Beside the paper's terms it holds the scenario's `Margins`, and it integrates by the staggered rule, of order
-        two: contact forces and throttles belong to intervals and velocities to their middles, so a force needs its foot
-        on the ground at both ends of its interval, and the motion is what its forces make of it between the knots too.
+        Beside the paper's terms it holds the scenario's `Margins`, and it integrates by leapfrog, of order two: the
+        motion is what its forces make of it between the knots too. A force acts half an interval before and after its
+        knot, so its foot is on the ground at the knots before and after as well.
         """
         terms = (margins.FRICTION_CONE if term is paper.FRICTION_CONE else term for term in paper.TERMS)
-        return cls(terms=(*terms, *paper.STAGGERED, *margins.TERMS), rule=STAGGERED)
+        return cls(terms=(*terms, *paper.LEAPFROG, *margins.TERMS), rule=LEAPFROG)
 
     @property
     def constraints(self) -> tuple[Constraint, ...]:
@@ -74,13 +74,19 @@ class Formulation:
 
     @property
     def own_terms(self) -> tuple[str, ...]:
-        """Return the names of the terms that are not the paper's."""
-        return tuple(term.name for term in self.terms if term not in (*paper.TERMS, *paper.STAGGERED))
+        """Return the names of the terms that `of_rule` does not have for this rule."""
+        usual = self._usual.terms
+        return tuple(term.name for term in self.terms if term not in usual)
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """Return the names of the paper's terms that are not among these."""
-        return tuple(term.name for term in paper.TERMS if term not in self.terms)
+        """Return the names of the terms that `of_rule` has for this rule and that are not among these."""
+        mine = {term.name for term in self.terms}
+        return tuple(term.name for term in self._usual.terms if term.name not in mine)
+
+    @property
+    def _usual(self) -> Formulation:
+        return Formulation.executable() if self.rule == LEAPFROG else Formulation.paper()
 
     def with_terms(self, *terms: Term) -> Formulation:
         """Return the formulation with more terms.
@@ -122,7 +128,7 @@ class Formulation:
         Raises:
             FormulationError: there is no rule of that name.
         """
-        known = {rules.BACKWARD_EULER: cls.paper, rules.STAGGERED: cls.staggered}
+        known = {rules.BACKWARD_EULER: cls.paper, rules.LEAPFROG: cls.executable}
         if name not in known:
             raise FormulationError(unknown("integration rule", name, known))
         return known[name]()

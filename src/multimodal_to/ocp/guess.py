@@ -19,12 +19,16 @@ from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 
 _CONTACT_TOLERANCE = 1e-6
 """A sole counts as on the ground below this height [m]: more corners than a plane needs make it overdetermined."""
+PLACES_WEIGHT = 30.0
+"""How much feet that are elsewhere than at home count, in squares of L, beside squares of joints' ways [rad²]."""
 _TILT_MAX = 0.6
 """How far the base may turn from home about each axis to stand on a slope [rad]."""
 
 
 def standing_posture(robot: Robot, surface: Surface, com: Vector3) -> Posture:
     """Return the posture nearest to home with every contact point on the ground and the CoM at `com` [m].
+
+    Near home are the joints and, seen from the CoM, the places of the feet: a robot that sinks keeps them where they are.
 
     The base keeps its home orientation; only where no posture stands so, on a slope that the ankles cannot follow, does
     it tilt, as little as the joints' way from home makes worth it. Least squares, solved by IPOPT.
@@ -56,18 +60,21 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
     position, tilt, joints = cs.SX.sym("p", 3), cs.SX.sym("tilt", 3), cs.SX.sym("s", count)
     orientation = quaternion.product(quaternion.exp(tilt), cs.DM(home.base_quaternion_xyzw))
     base = Pose(quaternion.rotation_matrix(orientation), position)
-    heights = [
-        surface.distance(forward_kinematics(tree, tree.frame(name), base, joints).translation)
-        for name in robot.contact_names
-    ]
+    points = [forward_kinematics(tree, tree.frame(name), base, joints).translation for name in robot.contact_names]
+    heights = [surface.distance(point) for point in points]
+    at_home = np.array(robot.kindyn.CoM_position(base_transform(home), home.joint_positions)).ravel()
+    places = contact_positions(robot, home).reshape(-1, 3) - at_home
+    moved = cs.vertcat(
+        *((point - com - place)[:2] / robot.standing_height for point, place in zip(points, places, strict=True))
+    )
     problem = {
         "x": cs.vertcat(position, tilt, joints),
-        "f": cs.sumsqr(joints - home.joint_positions) + cs.sumsqr(tilt),
+        "f": cs.sumsqr(joints - home.joint_positions) + cs.sumsqr(tilt) + PLACES_WEIGHT * cs.sumsqr(moved),
         "g": cs.vertcat(centroidal.com_position(tree, base, joints), *heights),
     }
     options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}}
     solver = cs.nlpsol("standing_posture", "ipopt", problem, options)
-    there = com - np.array(robot.kindyn.CoM_position(base_transform(home), home.joint_positions)).ravel()
+    there = com - at_home
     result = solver(
         x0=np.concatenate([home.base_position + there, np.zeros(3), home.joint_positions]),
         lbx=np.concatenate([np.full(3, -np.inf), np.full(3, -tilt_max), limits.lower]),
@@ -106,7 +113,8 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
 
     The standing posture moves with the CoM on the straight line from start to end. The contact points go along in x and
     y, or step `guess_steps` times. Contact forces carry the weight; a motion that starts in the air hands it over to
-    them linearly from the thrusts, one that walks into the air the other way round. Everything else is zero.
+    them linearly from the thrusts, one that walks into the air the other way round. A robot without jets that has to be
+    high at mid-horizon is thrown there. Everything else is zero.
 
     Args:
         robot: with the jets that the scenario uses.
@@ -131,9 +139,32 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     points = contact_positions(robot, standing).reshape(-1, 3, 1) + moved
     ground = heights_below(scenario.surface, points.transpose(1, 0, 2).reshape(3, -1)).reshape(-1, knots)
     points[:, 2] += ground - ground[:, :1]
+    if scenario.mid_height_min is not None and not robot.jets:
+        rise, speed = hop(robot, scenario, view["com_position"][2])
+        for name in ("com_position", "base_position"):
+            view[name][2] += rise
+        for name in ("com_velocity", "base_linear_velocity"):
+            view[name][2] += speed
+        points[:, 2] += rise
+        shares = shares * (rise <= 0.0)
     view["contact_positions"][:] = points.reshape(-1, knots)
     view["contact_forces"][2::3] = robot.weight * (1.0 - flown) * shares
     return guess
+
+
+def hop(robot: Robot, scenario: Scenario, heights: Array) -> tuple[Array, Array]:
+    """Return how far the robot is above where it stands [m], and its speed [m/s], (N + 1,) each: a throw to mid-horizon.
+
+    Args:
+        robot: without jets.
+        scenario: its `mid_height_min` is what the throw reaches.
+        heights: of the CoM while it stands [m], (N + 1,).
+    """
+    middle, interval = scenario.knots // 2, 0.5 * (scenario.interval_min + scenario.interval_max)
+    gravity = float(np.linalg.norm(robot.gravity))
+    times = interval * (np.arange(scenario.knots + 1) - middle)
+    rise = np.maximum((scenario.mid_height_min or 0.0) - heights[middle] - 0.5 * gravity * times**2, 0.0)
+    return rise, np.where(rise > 0.0, -gravity * times, 0.0)
 
 
 def _weight_flown(robot: Robot, scenario: Scenario) -> Array:

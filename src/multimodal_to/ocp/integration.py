@@ -25,7 +25,7 @@ class IntegrationRule(Protocol):
         ...
 
     def over(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
-        """Return what a quantity is over the interval: a velocity, which moves positions, or a contact force.
+        """Return what a velocity, which moves positions, is over the interval.
 
         Args:
             quantity: as a function of a knot.
@@ -87,18 +87,18 @@ BACKWARD_EULER = BackwardEuler()
 
 
 @dataclass(frozen=True)
-class Staggered:
-    """Velocities, contact forces and throttles are those of intervals, at their middles; configurations are at knots.
+class Leapfrog:
+    """Velocities are in the middles of intervals; all else is at the knots.
 
-    y_k+1 = y_k + v_k+½ Δt and v_k+½ = v_k−½ + a_k Δt, where a_k has the configuration of knot k and the mean of the
-    forces of the two intervals that meet there. Of order two; a foot that stands has no velocity that could ring.
-    A knot k holds what belongs to the interval that ends there.
+    y_k+1 = y_k + v_k+½ Δt and v_k+½ = v_k−½ + a_k Δt, with a_k of the configuration, forces and throttles of knot k and
+    the mean of its two velocities. The method of Störmer and Verlet, of order two; a foot that stands has no velocity
+    that could ring. A knot holds the velocities of the interval that ends there.
     """
 
-    name: str = rules.STAGGERED
+    name: str = rules.LEAPFROG
 
     def over(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
-        """Return the quantity of the interval, which its end holds.
+        """Return the velocity of the interval, which its end holds.
 
         Args:
             quantity: as a function of a knot.
@@ -108,13 +108,13 @@ class Staggered:
         return quantity(end)
 
     def at_accelerations(self, start: Knot, end: Knot) -> Knot:
-        """Return the interval's start, where two intervals meet, with the mean of what they hold.
+        """Return the interval's start, where two intervals meet, with the mean of their velocities.
 
         Args:
-            start: the knot at which the intervals meet, which holds the first one's velocities and forces.
+            start: the knot at which the intervals meet, which holds the first one's velocities.
             end: the knot that holds the second one's.
         """
-        means = {name: 0.5 * (getattr(start, name) + getattr(end, name)) for name in rules.OVER_INTERVALS}
+        means = {name: 0.5 * (getattr(start, name) + getattr(end, name)) for name in rules.VELOCITIES}
         return replace(start, **means)
 
     def at_velocities(self, end: Knot, duration: SX) -> Knot:
@@ -135,7 +135,7 @@ class Staggered:
         )
 
 
-STAGGERED = Staggered()
+LEAPFROG = Leapfrog()
 
 
 @dataclass(frozen=True)
@@ -154,11 +154,11 @@ class Interval:
 
     @cached_property
     def at_accelerations(self) -> Knot:
-        """Return the knot at whose instant velocities change, with the velocities, forces and throttles that act there."""
+        """Return the knot where velocities change, with the velocities that it has at that instant."""
         return self.rule.at_accelerations(self.start, self.end)
 
     def over(self, quantity: KnotQuantity) -> SX:
-        """Return what a quantity of knots, such as a velocity or a contact force, is over the interval."""
+        """Return what a velocity of knots is over the interval."""
         return self.rule.over(quantity, self.start, self.end)
 
     def gap(self, quantity: KnotQuantity, rate: KnotQuantity) -> SX:

@@ -17,15 +17,15 @@ from multimodal_to.models import contact
 from multimodal_to.models.centroidal import thrust_force
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.sole import soles
-from multimodal_to.ocp import paper
+from multimodal_to.ocp import costs, paper
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.ocp.self_collision import link_distances, link_pair_labels
 from multimodal_to.ocp.terms import Constraint, Where, at_least, between
-from multimodal_to.trajectory.quantities import row_labels
 
-GLIDE_RATE = 2.4
-"""κ: how much faster a contact point may move along the ground the higher it is [√(g / L)]."""
+PRESSURE_SLACK = 0.002
+"""Moment about an edge of the sole that is let go, so that a foot without load is inside the set [m g L]."""
 DESCENT_RATE = 1.2
 """κ: how much faster a contact point may come down the higher it is [√(g / L)]."""
 
@@ -58,8 +58,7 @@ def generalised_forces(interval: Interval) -> SX:
 
 def limited_joints(robot: Robot) -> Array:
     """Return which joints have an effort limit, as their places in s."""
-    effort = robot.joint_limits.effort
-    return np.flatnonzero(np.isfinite(effort) & (effort > 0.0) & (effort < 1e4))
+    return np.flatnonzero(np.isfinite(robot.joint_limits.effort))
 
 
 def joint_torques(interval: Interval, parameters: Parameters) -> SX:
@@ -75,7 +74,7 @@ def friction_cone(knot: Knot, parameters: Parameters) -> SX:
 
 
 def centre_of_pressure(knot: Knot, parameters: Parameters) -> SX:
-    """Moment of the normal forces about each edge of the sole, shrunk about its middle; over m |g| [m].
+    """Moment of the normal forces about each edge of the sole, shrunk about its middle, over m |g| L.
 
     Σ e_⊥ · (r_i − η a) n·f_i with the place r_i of each contact point in the sole, an edge from a along e, and the
     share η of the sole that a plan may use. None negative where the centre of pressure is inside.
@@ -86,24 +85,11 @@ def centre_of_pressure(knot: Knot, parameters: Parameters) -> SX:
         for point, force in zip(knot.points, knot.forces, strict=True)
     ]
     rows = [
-        cs.dot(cs.DM(edge), cs.vertcat(*(loads[index] for index in sole.members)))
+        cs.dot(cs.DM(edge / parameters.robot.standing_height), cs.vertcat(*(loads[index] for index in sole.members)))
         for sole in soles(parameters.robot)
         for edge in sole.leverage(share)
     ]
     return cs.vertcat(cs.SX(0, 1), *rows)
-
-
-def gliding(interval: Interval, parameters: Parameters) -> SX:
-    """(Δt (v + κ d) ∓ t·Δp) / L: a point that moves along the ground is off it, the higher the faster."""
-    robot = parameters.robot
-    speed, rate = parameters.scenario.margins.glide_speed * robot.speed_unit, GLIDE_RATE * robot.rate_unit
-    rows = []
-    for before, after in zip(interval.start.points, interval.end.points, strict=True):
-        along = parameters.surface.tangents(after).T @ (after - before)
-        height = 0.5 * (parameters.surface.distance(before) + parameters.surface.distance(after))
-        reach = interval.duration * (speed + rate * height)
-        rows += [reach - along, reach + along]
-    return cs.vertcat(*rows) / robot.standing_height
 
 
 def touch_down(interval: Interval, parameters: Parameters) -> SX:
@@ -139,21 +125,12 @@ JOINT_TORQUES = Constraint(
 FRICTION_CONE = replace(paper.FRICTION_CONE, value=friction_cone)
 CENTRE_OF_PRESSURE = Constraint(
     value=centre_of_pressure,
-    within=at_least(0.0),
-    unit="m",
+    within=at_least(-PRESSURE_SLACK),
+    unit="1",
     holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
     scale=0.01,
     labels=_edges,
     when=_asked("pressure"),
-)
-GLIDING = Constraint(
-    value=gliding,
-    within=at_least(0.0),
-    unit="1",
-    holds=Where.EVERY_INTERVAL,
-    scale=0.1,
-    labels=lambda parameters: row_labels(parameters.robot, "contact", ("+x", "+y", "-x", "-y")),
-    when=_asked("glide_speed"),
 )
 TOUCH_DOWN = Constraint(
     value=touch_down,
@@ -165,5 +142,20 @@ TOUCH_DOWN = Constraint(
     when=_asked("touch_down_speed"),
 )
 
-TERMS = (CENTRE_OF_PRESSURE, GLIDING, TOUCH_DOWN, JOINT_TORQUES)
-"""What a plan that the robot carries out keeps away from, beside the terms of the paper."""
+LINK_DISTANCES = Constraint(
+    value=link_distances,
+    within=at_least(lambda parameters: parameters.scenario.margins.distance * parameters.robot.standing_height),
+    unit="m",
+    scale=0.1,
+    labels=link_pair_labels,
+    when=_asked("distance"),
+)
+CONSTRAINTS = (CENTRE_OF_PRESSURE, TOUCH_DOWN, JOINT_TORQUES, LINK_DISTANCES)
+COSTS = (
+    paper.running(costs.throttle_rate, "%/s", Where.EVERY_INTERVAL, scale=50.0),
+    paper.running(costs.joint_accelerations, "rad/s²", Where.EVERY_INTERVAL, scale=10.0),
+    paper.running(costs.foot_tilt, "1", scale=0.1),
+    paper.running(costs.skimming, "1", Where.EVERY_INTERVAL, scale=0.1),
+)
+TERMS = (*CONSTRAINTS, *COSTS)
+"""What a plan that the robot carries out asks for beside the terms of the paper."""

@@ -54,7 +54,8 @@ def formulate(robot: Robot, scenario: Scenario, standing: Posture, formulation: 
     layout = Layout.of(robot, formulation.variables)
     box = ranges(robot, scenario, layout)
     bounds = box.copy()
-    stages, held = collect(formulation, Parameters.of(robot, scenario, standing), layout, bounds)
+    parameters = Parameters.of(robot, scenario, standing, _target(robot, scenario, standing))
+    stages, held = collect(formulation, parameters, layout, bounds)
     set_boundary(box, robot, scenario, standing, formulation.rule.name)
     try:
         set_boundary(bounds, robot, scenario, standing, formulation.rule.name)
@@ -99,3 +100,11 @@ def _standing(robot: Robot, scenario: Scenario) -> Posture:
     if scenario.terminal is Terminal.STANDING:
         return standing_posture(robot, scenario.surface, scenario.final_com)
     return robot.home
+
+
+def _target(robot: Robot, scenario: Scenario, standing: Posture) -> Posture:
+    """Return the posture that posture costs pull to: where a motion ends standing elsewhere, that of the end."""
+    stands = scenario.start is Start.STANDING and scenario.terminal is Terminal.STANDING
+    if stands and scenario.initial_com != scenario.final_com:
+        return standing_posture(robot, scenario.surface, scenario.final_com)
+    return standing

@@ -6,6 +6,7 @@ They are made as a user's own terms are. The first few places matter: rows and c
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -192,6 +193,10 @@ COMPLEMENTARITY_BEFORE = Constraint(
     holds=Where.EVERY_INTERVAL,
     labels=_each("contact"),
 )
+COMPLEMENTARITY_AFTER = replace(
+    COMPLEMENTARITY_BEFORE, name="complementarity_after", value=constraints.complementarity_after
+)
+SLIDING_AFTER = replace(SLIDING, name="sliding_after", value=constraints.sliding_after)
 FINAL_EQUILIBRIUM = Constraint(
     name="final_equilibrium",
     value=constraints.static_equilibrium,
@@ -212,8 +217,8 @@ FINAL_STEADY_THRUST = Constraint(
     labels=_each("jet"),
     when=_hovers_last,
 )
-STAGGERED = (COMPLEMENTARITY_BEFORE, FINAL_EQUILIBRIUM, FINAL_STEADY_THRUST)
-"""What the staggered rule asks for beside: its forces belong to intervals, and no interval follows the last knot."""
+LEAPFROG = (COMPLEMENTARITY_BEFORE, COMPLEMENTARITY_AFTER, SLIDING_AFTER, FINAL_EQUILIBRIUM, FINAL_STEADY_THRUST)
+"""What leapfrog asks for beside: a force acts half an interval before and after its knot, and none follows the last."""
 
 CONSTRAINTS = (
     UNIT_QUATERNION,
@@ -241,7 +246,7 @@ CONSTRAINTS = (
 # -------------------------------------------------------------------- costs
 
 
-def _weight_of(name: str) -> Callable[[Parameters], float | Array]:
+def weight_of(name: str) -> Callable[[Parameters], float | Array]:
     """Return the scenario's weight of a name; one by joint group becomes one for each joint."""
 
     def weight(parameters: Parameters) -> float | Array:
@@ -256,7 +261,7 @@ def _weight_of(name: str) -> Callable[[Parameters], float | Array]:
     return weight
 
 
-def _running(
+def running(
     residual: KnotFunction | IntervalFunction,
     unit: str | tuple[str, ...],
     *charged: Where,
@@ -265,31 +270,30 @@ def _running(
     """Return a cost that is charged per second."""
     name = residual.__name__
     places = charged or (Where.LATER_KNOTS,)
-    return Cost(residual=residual, weight=_weight_of(name), unit=unit, charged=places, scale=scale)
+    return Cost(residual=residual, weight=weight_of(name), unit=unit, charged=places, scale=scale)
 
 
 def _once(name: str, residual: KnotFunction | IntervalFunction, unit: str, where: Where = Where.LAST_KNOT) -> Cost:
     """Return a cost that is charged once."""
-    return Cost(name=name, residual=residual, weight=_weight_of(name), unit=unit, charged=where, per_second=False)
+    return Cost(name=name, residual=residual, weight=weight_of(name), unit=unit, charged=where, per_second=False)
 
 
 _TWIST_RATE = ("m/s²", "m/s²", "m/s²", "rad/s²", "rad/s²", "rad/s²")
 
 COSTS = (
-    _running(costs.com_velocity, "m/s"),
-    _running(costs.com_acceleration, "m/s²", Where.EVERY_INTERVAL),
-    _running(costs.angular_momentum, "kg m²/s"),
-    _running(costs.angular_momentum_rate, "N m", Where.EVERY_INTERVAL),
-    _running(costs.base_acceleration, _TWIST_RATE, Where.EVERY_INTERVAL),
-    _running(costs.joint_velocities, "rad/s"),
-    _running(costs.posture, "rad"),
-    _running(costs.base_orientation, "1"),
-    _running(costs.contact_forces, "N", Where.FIRST_KNOT, Where.LATER_KNOTS, scale=50.0),
-    _running(costs.contact_force_rates, "N/s", Where.EVERY_INTERVAL, scale=50.0),
-    _running(costs.thrust, "N", scale=100.0),
-    _running(costs.thrust_rate, "N/s", scale=50.0),
-    _running(costs.throttle, "%", scale=50.0),
-    _running(costs.throttle_rate, "%/s", Where.EVERY_INTERVAL, scale=50.0),
+    running(costs.com_velocity, "m/s"),
+    running(costs.com_acceleration, "m/s²", Where.EVERY_INTERVAL),
+    running(costs.angular_momentum, "kg m²/s"),
+    running(costs.angular_momentum_rate, "N m", Where.EVERY_INTERVAL),
+    running(costs.base_acceleration, _TWIST_RATE, Where.EVERY_INTERVAL),
+    running(costs.joint_velocities, "rad/s"),
+    running(costs.posture, "rad"),
+    running(costs.base_orientation, "1"),
+    running(costs.contact_forces, "N", Where.FIRST_KNOT, Where.LATER_KNOTS, scale=50.0),
+    running(costs.contact_force_rates, "N/s", Where.EVERY_INTERVAL, scale=50.0),
+    running(costs.thrust, "N", scale=100.0),
+    running(costs.thrust_rate, "N/s", scale=50.0),
+    running(costs.throttle, "%", scale=50.0),
     _once("initial_posture", costs.posture, "rad", Where.FIRST_KNOT),
     _once("final_posture", costs.posture, "rad"),
     _once("final_com_velocity", costs.com_velocity, "m/s"),

@@ -18,15 +18,17 @@ class Parameters:
     surface: Surface
     friction: float  # Coulomb's coefficient [1]
     standing: Posture  # near home, with the CoM where the motion starts
+    target: Posture  # what posture costs pull to: that of the end where the motion ends standing, else the same
 
     @classmethod
-    def of(cls, robot: Robot, scenario: Scenario, standing: Posture) -> Parameters:
+    def of(cls, robot: Robot, scenario: Scenario, standing: Posture, target: Posture | None = None) -> Parameters:
         """Return the parameters of a scenario; a friction that it leaves open is the robot's.
 
         Args:
             robot: with the jets that the scenario uses.
             scenario: the task.
             standing: posture near home, with the CoM where the motion starts.
+            target: what posture costs pull to; by default the same.
         """
         return cls(
             robot=robot,
@@ -34,4 +36,5 @@ class Parameters:
             surface=CachedSurface(scenario.surface),
             friction=scenario.friction or robot.friction,
             standing=standing,
+            target=target or standing,
         )

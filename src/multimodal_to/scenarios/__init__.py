@@ -14,10 +14,10 @@ from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal,
 
 __all__ = [
     "SCENARIOS",
+    "Margins",
     "Scenario",
     "Start",
     "Terminal",
-    "Margins",
     "Weights",
     "find",
     "jump",

@@ -76,6 +76,12 @@ class Weights:
     """Weight of u [1/%²]."""
     throttle_rate: float = 0.0
     """Weight of u̇ [1/(%/s)²]."""
+    joint_accelerations: float = 0.0
+    """Weight of s̈ [1/(rad/s²)²]."""
+    foot_tilt: float = 0.0
+    """Weight of soles that are not level with the ground: heights of their points, over the standing height L [1]."""
+    skimming: float = 0.0
+    """Weight of contact points that move along the ground close to it, over √(g L) [1]."""
     initial_posture: float = 0.0
     """Weight of s − s̄ at the first knot, where it is found [1/rad²]."""
     final_posture: float = 0.0
@@ -113,8 +119,6 @@ class Margins:
     """Size of the sole that a foot's centre of pressure stays in, as a share of the whole sole [1]."""
     touch_down_speed: float = 0.04
     """Greatest speed at which a contact point comes to the ground [√(g L)]."""
-    glide_speed: float = 0.01
-    """Greatest speed of a contact point along the ground that it touches [√(g L)]."""
     distance: float = 0.03
     """Least distance between links of the robot that are not neighbours [L]."""
 

@@ -10,30 +10,32 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 
 BACKWARD_EULER = "backward Euler"
+LEAPFROG = "leapfrog"
 STAGGERED = "staggered"
+"""A rule that this release only reads: as leapfrog, but contact forces and throttles are constant over intervals."""
 SAMPLED = "sampled"
 """Not a rule: every quantity of a column is at the time of its knot, as `resample` returns them."""
 
-OVER_INTERVALS = (
+VELOCITIES = (
     "com_velocity",
     "angular_momentum",
     "base_linear_velocity",
     "base_angular_velocity",
     "joint_velocities",
     "thrust_rate",
-    "contact_forces",
-    "throttle",
 )
-"""What belongs to an interval under the staggered rule; column k is of the interval that ends at knot k."""
+"""What is in the middle of an interval under leapfrog; column k is of the interval that ends at knot k."""
 HELD = ("contact_forces", "throttle")
-"""What is constant over an interval under the staggered rule; the rest of `OVER_INTERVALS` is at its middle."""
-RATES = ("com_acceleration", "angular_momentum_rate", "thrust_acceleration", "contact_force_rates")
-"""The differences between two intervals: column k lies between the intervals before and after knot k − 1."""
+"""What is constant over an interval under the staggered rule."""
+ACCELERATIONS = ("com_acceleration", "angular_momentum_rate", "thrust_acceleration")
+"""The differences between two intervals: column k is of knot k − 1, where the two meet."""
 
+_BETWEEN = {**dict.fromkeys(VELOCITIES, 0.5), **dict.fromkeys(ACCELERATIONS, 1.0)}
 INSTANTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     {
         BACKWARD_EULER: MappingProxyType({}),
-        STAGGERED: MappingProxyType({**dict.fromkeys(OVER_INTERVALS, 0.5), **dict.fromkeys(RATES, 1.0)}),
+        LEAPFROG: MappingProxyType({**_BETWEEN, "contact_force_rates": 0.5}),
+        STAGGERED: MappingProxyType({**_BETWEEN, "contact_force_rates": 1.0, **dict.fromkeys(HELD, 0.5)}),
         SAMPLED: MappingProxyType({}),
     }
 )
