@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Annotated
@@ -16,8 +17,9 @@ from multimodal_to.cli.completion import robots_or_folders, scenarios_or_files
 from multimodal_to.errors import InputError, OutputError, TrajectoryError
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.scenarios import find
+from multimodal_to.scenarios import paper as as_in_paper
 from multimodal_to.scenarios.files import change, load
-from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.scenarios.scenario import Margins, Scenario
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.archive import read_archive
 from multimodal_to.trajectory.importing import import_arrays
@@ -54,9 +56,20 @@ RobotOption = Annotated[
 ]
 
 
-def chosen(name: str, settings: list[str] | None) -> Scenario:
-    """Return a bundled scenario or that of a file, with the changes asked for."""
-    return change(load(name) if name.endswith(".toml") else find(name), settings or ())
+def chosen(name: str, settings: list[str] | None, *, paper: bool = False) -> Scenario:
+    """Return a bundled scenario or that of a file, with the changes asked for.
+
+    Args:
+        name: of the scenario, or its TOML file.
+        settings: changes as `KEY=VALUE`.
+        paper: as the paper's own formulation is solved with it.
+    """
+    if name.endswith(".toml"):
+        scenario = load(name)
+        scenario = replace(scenario, margins=Margins.none()) if paper else scenario
+    else:
+        scenario = as_in_paper(name) if paper else find(name)
+    return change(scenario, settings or ())
 
 
 def loaded(file: Path, robot: str) -> tuple[Robot, Trajectory]:

@@ -35,9 +35,10 @@ from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
 from multimodal_to.errors import InputError, ScenarioError
 from multimodal_to.models.robot import Robot, load_robot
-from multimodal_to.ocp import build
+from multimodal_to.ocp import Formulation, build
 from multimodal_to.ocp import precompile as compile_problem
 from multimodal_to.scenarios import SCENARIOS, find
+from multimodal_to.scenarios import paper as as_in_paper
 from multimodal_to.scenarios.data import stored, to_dict
 from multimodal_to.scenarios.files import change, to_toml
 from multimodal_to.scenarios.scenario import Scenario
@@ -188,7 +189,7 @@ def solve(
             autocompletion=completion.linear_solvers,
         ),
     ] = AUTO,
-    staggered: Annotated[bool, typer.Option("--staggered", help="Integrate by the rule of order two.")] = False,
+    paper: Annotated[bool, typer.Option("--paper", help="Solve the paper's own problem, without margins.")] = False,
     warm_start: Annotated[Path | None, typer.Option(help="Trajectory of a similar task to start from.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Try a task that the doctor calls hopeless.")] = False,
     resume: Annotated[Path | None, typer.Option(help="Checkpoint or trajectory to go on from.")] = None,
@@ -208,7 +209,7 @@ def solve(
 
     Example: multimodal-to solve --resume results/take-off/checkpoint.npz
     """
-    task = given(name, settings, robot, staggered=staggered, warm_start=warm_start, resume=resume)
+    task = given(name, settings, robot, paper=paper, warm_start=warm_start, resume=resume)
     scenario = task.scenario
     solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit, linear_solver=linear_solver)
     chosen_solver = choose(linear_solver)  # before anything takes time
@@ -324,13 +325,15 @@ def reproduce_scenarios(
 ) -> None:
     """Solve the bundled scenarios again and tabulate the answers beside the paper's figures.
 
-    For each, trajectory, figures and report go to a folder of its name; the tables go to table.md. Exit status 0 only
-    when every solve has an answer that passes the audit.
+    Each is solved as a plan that the robot carries out and, into a folder NAME-paper, as the paper's own problem.
+    Trajectory, figures and report go to the folders; the tables go to table.md. Exit status 0 only when every solve has
+    an answer, and those of the first kind pass the audit.
 
     Example: multimodal-to reproduce take-off jump --output results
     """
-    scenarios = [find(name) for name in names or SCENARIOS]
-    folders = [writable(output / scenario.name) for scenario in scenarios]
+    asked = names or SCENARIOS
+    tasks = [(find(name), Formulation.executable(), writable(output / name)) for name in asked]
+    tasks += [(as_in_paper(name), Formulation.paper(), writable(output / f"{name}-paper")) for name in asked]
     robot = load_robot("ironcub")
 
     from multimodal_to.files.writing import write_text
@@ -339,10 +342,10 @@ def reproduce_scenarios(
 
     files = [] if published is None else read_published(robot, published)
     runs = []
-    for scenario, folder in zip(scenarios, folders, strict=True):
-        out.print(f"{scenario.name}: {scenario.title}")
+    for scenario, formulation, folder in tasks:
+        out.print(f"{folder.name}: {scenario.title}")
         with Progress(out, expect(scenario)) as progress:
-            run = reproduce(robot, scenario, progress=progress)
+            run = reproduce(robot, scenario, progress=progress, formulation=formulation)
         write_run(run, folder)
         runs.append(run)
         out.print(f"wrote {folder}", soft_wrap=True)
@@ -356,5 +359,5 @@ def reproduce_scenarios(
             drawn.add_row(*cells)
         out.print(drawn)
     out.print(f"wrote {write_text(output / 'table.md', markdown([*runs, *files]))}", soft_wrap=True)
-    if len(runs) < len(scenarios) or not all(run.holds for run in runs):
+    if len(runs) < len(tasks) or not all(run.holds if run.executable else run.solved for run in runs):
         raise typer.Exit(1)

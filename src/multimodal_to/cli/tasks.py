@@ -14,7 +14,7 @@ from multimodal_to.scenarios.data import stored
 from multimodal_to.scenarios.files import change
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory
-from multimodal_to.trajectory.rules import STAGGERED
+from multimodal_to.trajectory.rules import BACKWARD_EULER
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,7 +32,7 @@ def given(
     settings: list[str] | None,
     robot: str,
     *,
-    staggered: bool,
+    paper: bool,
     warm_start: Path | None,
     resume: Path | None,
 ) -> Task:
@@ -42,7 +42,7 @@ def given(
         name: of a bundled scenario, or its TOML file.
         settings: changes as `KEY=VALUE`.
         robot: name or folder; empty for the file's own, or the iRonCub.
-        staggered: whether the problem is integrated by the staggered rule.
+        paper: whether it is the paper's own formulation.
         warm_start: trajectory file of a similar task.
         resume: checkpoint or trajectory file of an unfinished solve.
 
@@ -54,8 +54,10 @@ def given(
         if name is None:
             raise InputError("nothing to solve; expected the NAME of a scenario, or --resume FILE")
         start = None if warm_start is None else Trajectory.load(warm_start)
-        formulation = Formulation.staggered() if staggered else Formulation.paper()
-        return Task(scenario=chosen(name, settings), robot=robot or "ironcub", formulation=formulation, start=start)
+        formulation = Formulation.paper() if paper else Formulation.executable()
+        return Task(
+            scenario=chosen(name, settings, paper=paper), robot=robot or "ironcub", formulation=formulation, start=start
+        )
     if warm_start is not None:
         raise InputError("--resume and --warm-start both say what to start from; expected one of them")
     start = Trajectory.load(resume)
@@ -64,15 +66,17 @@ def given(
             f"'{resume}' is of a problem that this command does not have ({unusual}); go on from it in the script that "
             "makes these terms, with solve(problem, start=Trajectory.load(...))"
         )
-    if staggered and start.rule != STAGGERED:
+    if paper and start.rule != BACKWARD_EULER:
         raise InputError(
-            f"'{resume}' is integrated by {start.rule}, and --resume goes on with its own rule; --warm-start starts a "
-            "staggered solve from it"
+            f"'{resume}' is integrated by {start.rule}, and --resume goes on with its own rule; --warm-start starts the "
+            "paper's problem from it"
         )
     scenario = stored(start)
     if scenario is None:
         raise ScenarioError(f"'{resume}' keeps no scenario to go on with; name one and start from it by --warm-start")
-    asked = change(scenario, settings or ()) if name is None else chosen(name, settings)
+    asked = (
+        change(scenario, settings or ()) if name is None else chosen(name, settings, paper=start.rule == BACKWARD_EULER)
+    )
     if asked != scenario:
         raise InputError(
             f"'{resume}' is of '{scenario.name}' with other values than asked for; --resume goes on with its own, "

@@ -49,7 +49,7 @@ def doctor(robot: Robot, scenario: Scenario, formulation: Formulation | None = N
     Args:
         robot: whose motion it is.
         scenario: the task.
-        formulation: what the problem is made of; by default `Formulation.paper()`.
+        formulation: what the problem is made of; by default `Formulation.executable()`.
     """
     task = Task.of(robot, scenario, formulation)
     if not robot.contacts:

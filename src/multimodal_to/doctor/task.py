@@ -34,10 +34,10 @@ class Task:
         Args:
             robot: whose motion it is.
             scenario: the task.
-            formulation: what the problem is made of; by default `Formulation.paper()`.
+            formulation: what the problem is made of; by default `Formulation.executable()`.
         """
         robot = robot if scenario.jets else robot.with_jets(())
-        return cls(robot=robot, scenario=scenario, formulation=formulation or Formulation.paper())
+        return cls(robot=robot, scenario=scenario, formulation=formulation or Formulation.executable())
 
     # ---------------------------------------------------------------- time
 

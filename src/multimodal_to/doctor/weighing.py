@@ -112,9 +112,11 @@ def scales(task: Task) -> Iterator[Symptom]:
         expected["thrust"] = robot.weight / len(robot.jets)
     for name, size in expected.items():
         unit = QUANTITIES[name].unit
-        yield from _off(name, size, known[name], unit, f"Formulation.paper().with_scales({{'{name}': {size:.1g}}})")
+        yield from _off(
+            name, size, known[name], unit, f"Formulation.executable().with_scales({{'{name}': {size:.1g}}})"
+        )
     interval = scenario.interval_max
-    change = f"replace(Formulation.paper(), interval_scale={interval:.1g})"
+    change = f"replace(Formulation.executable(), interval_scale={interval:.1g})"
     yield from _off("interval", interval, task.formulation.interval_scale, "s", change)
 
 

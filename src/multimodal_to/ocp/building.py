@@ -28,13 +28,13 @@ def build(robot: Robot, scenario: Scenario, formulation: Formulation | None = No
     Args:
         robot: whose motion it is.
         scenario: the task.
-        formulation: what the problem is made of; by default `Formulation.paper()`.
+        formulation: what the problem is made of; by default `Formulation.executable()`.
 
     Raises:
         ScenarioError: the scenario contradicts itself or does not fit the robot.
         FormulationError: a term does not return what it has to, or is not a number at the start guess.
     """
-    formulation = formulation or Formulation.paper()
+    formulation = formulation or Formulation.executable()
     robot, standing = prepared(robot, scenario)
     outline = formulate(robot, scenario, standing, formulation)
     layout = outline.layout
@@ -81,7 +81,7 @@ def precompile(robot: Robot, scenario: Scenario, formulation: Formulation | None
     Args:
         robot: whose motion it is.
         scenario: the task.
-        formulation: what the problem is made of; by default `Formulation.paper()`.
+        formulation: what the problem is made of; by default `Formulation.executable()`.
 
     Raises:
         ScenarioError: the scenario contradicts itself or does not fit the robot.
@@ -90,7 +90,7 @@ def precompile(robot: Robot, scenario: Scenario, formulation: Formulation | None
         OutputError: the folder of compiled derivatives cannot be written to.
     """
     robot, standing = prepared(robot, scenario)
-    outline = formulate(robot, scenario, standing, formulation or Formulation.paper())
+    outline = formulate(robot, scenario, standing, formulation or Formulation.executable())
     repeated = [named.stage for named in outline.stages if named.stage.repeats > 1]
     return compiled.compile_functions(function for stage in repeated for function in stage.derivatives())
 

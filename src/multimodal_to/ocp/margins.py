@@ -10,14 +10,15 @@ from dataclasses import replace
 
 import casadi as cs
 import numpy as np
+from numpy.typing import NDArray
 
 from multimodal_to.adam.rnea import inverse_dynamics
-from multimodal_to.adam.spatial import SX, Array
+from multimodal_to.adam.spatial import SX
 from multimodal_to.models import contact
 from multimodal_to.models.centroidal import thrust_force
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.sole import soles
-from multimodal_to.ocp import costs, paper
+from multimodal_to.ocp import constraints, costs, paper
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
@@ -56,7 +57,7 @@ def generalised_forces(interval: Interval) -> SX:
     )
 
 
-def limited_joints(robot: Robot) -> Array:
+def limited_joints(robot: Robot) -> NDArray[np.intp]:
     """Return which joints have an effort limit, as their places in s."""
     return np.flatnonzero(np.isfinite(robot.joint_limits.effort))
 
@@ -70,7 +71,7 @@ def joint_torques(interval: Interval, parameters: Parameters) -> SX:
 def friction_cone(knot: Knot, parameters: Parameters) -> SX:
     """|t·f| ≤ η μ n·f as the scenario's pyramid or cone, with the share η of the friction that a plan may use."""
     share = parameters.scenario.margins.friction or 1.0
-    return paper.FRICTION_CONE.value(knot, replace(parameters, friction=share * parameters.friction))
+    return constraints.friction_cone(knot, replace(parameters, friction=share * parameters.friction))
 
 
 def centre_of_pressure(knot: Knot, parameters: Parameters) -> SX:

@@ -132,13 +132,14 @@ def table(runs: Sequence[Run], columns: Sequence[Column]) -> ResultsTable:
     solved, files = [run for run in runs if run.solution], [run for run in runs if not run.solution]
     rows = []
     for run in solved:
-        rows.append((run.name, *(column.of_run(run) for column in columns)))
+        label = run.name if run.executable else f"{run.name}, the paper's problem"
+        rows.append((label, *(column.of_run(run) for column in columns)))
         rows += [
             (f"{run.name}, {paper.label}", *(column.of_published(paper) for column in columns))
             for paper in PUBLISHED
-            if paper.scenario == run.name
+            if paper.scenario == run.name and not run.executable
         ]
-        rows += [_of_file(file, columns) for file in files if file.name == run.name]
+        rows += [_of_file(file, columns) for file in files if file.name == run.name and not run.executable]
     names = {run.name for run in solved}
     rows += [_of_file(file, columns) for file in files if file.name not in names]
     known = tuple(row for row in rows if set(row[1:]) != {UNKNOWN})

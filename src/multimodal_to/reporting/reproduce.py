@@ -11,7 +11,8 @@ from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.errors import TrajectoryError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
-from multimodal_to.ocp import build
+from multimodal_to.ocp import Formulation, build
+from multimodal_to.ocp.integration import LEAPFROG
 from multimodal_to.plotting import FIGURES, plot, save
 from multimodal_to.reporting.report import write_report
 from multimodal_to.scenarios import Scenario
@@ -31,16 +32,28 @@ class Run:
     trajectory: Trajectory
     report: Audit
     steps: int
+    executable: bool = False  # solved as a plan that the robot carries out; else it is the paper's problem
     solution: Solution | None = None  # None: the trajectory is one of others
     whole_time: float | None = None  # to build, solve and audit [s]
 
     @property
+    def solved(self) -> bool:
+        """Return whether the motion is an answer."""
+        return self.solution is None or self.solution.status.solved
+
+    @property
     def holds(self) -> bool:
         """Return whether the motion is an answer and passes the audit."""
-        return self.report.holds and (self.solution is None or self.solution.status.solved)
+        return self.report.holds and self.solved
 
 
-def reproduce(robot: Robot, scenario: Scenario, solver: Ipopt | None = None, progress: Progress | None = None) -> Run:
+def reproduce(
+    robot: Robot,
+    scenario: Scenario,
+    solver: Ipopt | None = None,
+    progress: Progress | None = None,
+    formulation: Formulation | None = None,
+) -> Run:
     """Solve a scenario from its plain start guess and audit the answer.
 
     Args:
@@ -48,9 +61,11 @@ def reproduce(robot: Robot, scenario: Scenario, solver: Ipopt | None = None, pro
         scenario: to solve.
         solver: by default `Ipopt()`.
         progress: told of every iteration; it may stop the solve by returning True.
+        formulation: what the problem is made of; by default `Formulation.executable()`.
     """
+    formulation = formulation or Formulation.executable()
     started = time.perf_counter()
-    problem = build(robot, scenario)
+    problem = build(robot, scenario, formulation)
     solution = solve(problem, solver, progress)
     report = audit(problem.robot, solution.trajectory, scenario)
     return Run(
@@ -59,6 +74,7 @@ def reproduce(robot: Robot, scenario: Scenario, solver: Ipopt | None = None, pro
         trajectory=solution.trajectory,
         report=report,
         steps=len(footsteps(problem.robot, solution.trajectory, scenario.surface)),
+        executable=formulation.rule == LEAPFROG,
         solution=solution,
         whole_time=time.perf_counter() - started,
     )
