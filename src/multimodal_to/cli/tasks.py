@@ -68,8 +68,8 @@ def given(
         )
     if paper and start.rule != BACKWARD_EULER:
         raise InputError(
-            f"'{resume}' is integrated by {start.rule}, and --resume goes on with its own rule; --warm-start starts the "
-            "paper's problem from it"
+            f"'{resume}' is integrated by {start.rule}, and --resume goes on with its own rule; --warm-start starts "
+            "the paper's problem from it"
         )
     scenario = stored(start)
     if scenario is None:

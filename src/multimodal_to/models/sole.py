@@ -1,4 +1,4 @@
-"""The sole of a foot: where its contact points are in it, and the edges that a centre of pressure has to stay inside."""
+"""The sole of a foot: where its contact points are in it, and the edges that a centre of pressure stays inside."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def joint_velocities(knot: Knot, parameters: Parameters) -> SX:
 
 
 def posture(knot: Knot, parameters: Parameters) -> SX:
-    """s − s̄, with the posture in which the robot stands at the end, or else at the start, as s̄ (`Parameters.target`)."""
+    """s − s̄, with the posture in which the robot stands at the end, else at the start, as s̄ (`Parameters.target`)."""
     return knot.joint_positions - cs.DM(parameters.target.joint_positions)
 
 

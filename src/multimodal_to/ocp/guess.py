@@ -28,7 +28,7 @@ _TILT_MAX = 0.6
 def standing_posture(robot: Robot, surface: Surface, com: Vector3) -> Posture:
     """Return the posture nearest to home with every contact point on the ground and the CoM at `com` [m].
 
-    Near home are the joints and, seen from the CoM, the places of the feet: a robot that sinks keeps them where they are.
+    Near home are the joints and, seen from the CoM, the places of the feet: a robot that sinks keeps them there.
 
     The base keeps its home orientation; only where no posture stands so, on a slope that the ankles cannot follow, does
     it tilt, as little as the joints' way from home makes worth it. Least squares, solved by IPOPT.
@@ -153,7 +153,7 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
 
 
 def hop(robot: Robot, scenario: Scenario, heights: Array) -> tuple[Array, Array]:
-    """Return how far the robot is above where it stands [m], and its speed [m/s], (N + 1,) each: a throw to mid-horizon.
+    """Return how far the robot is above its stance [m], and its speed [m/s], (N + 1,) each: a throw to mid-horizon.
 
     Args:
         robot: without jets.

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
+from typing import Any
 
 from multimodal_to.errors import ScenarioError, unknown
 from multimodal_to.models.terrain import Stairs
@@ -121,9 +122,9 @@ def walk_to_fly() -> Scenario:
 def jump() -> Scenario:
     """Return the jump without thrust: above 0.66 m at mid-horizon and back at the start posture.
 
-    The paper asks for 0.75 m. Within nine tenths of the torques of its motors, with force only while a foot stands, this
-    robot does not get there: at 0.70 m no plan was found. A step of 0.02 s keeps the base's wrench explained, and
-    contacts are looser than elsewhere, since what a force of twice the weight is multiplied with is small.
+    The paper asks for 0.75 m. Within nine tenths of its motors' torques, with force only while a foot stands, this
+    robot does not get there: at 0.70 m no plan was found. A step of 0.02 s keeps the base's wrench explained. Contacts
+    have twice the freedom that they have elsewhere, since the forces are twice as large.
     """
     return Scenario(
         name="jump",
@@ -188,7 +189,12 @@ SCENARIOS: Mapping[str, Callable[[], Scenario]] = MappingProxyType(
 """The bundled scenarios by name."""
 
 
-_NOT_IN_THE_PAPER = {"throttle_rate": 0.0, "joint_accelerations": 0.0, "foot_tilt": 0.0, "skimming": 0.0}
+_NOT_IN_THE_PAPER: dict[str, Any] = {
+    "throttle_rate": 0.0,
+    "joint_accelerations": 0.0,
+    "foot_tilt": 0.0,
+    "skimming": 0.0,
+}
 
 
 def paper(name: str) -> Scenario:
