@@ -31,6 +31,7 @@ from multimodal_to.trajectory.derived import (
     base_poses,
     flight_phases,
     generalised_forces,
+    greatest_while_acting,
     loaded_force,
     surface_frames,
 )
@@ -204,7 +205,8 @@ def _dynamics(motion: Motion) -> list[Worst]:
 def _followed(values: Array, trajectory: Trajectory) -> Array:
     """Return the values at knots at which an acceleration is known, along the last axis.
 
-    Under a staggered rule no interval follows the last knot. Whether a motion rests there is what its task asks.
+    Where velocities are in the middles of intervals, none follows the last knot. Whether a motion rests there is what
+    its task asks.
     """
     return values[..., :-1] if rules.instant(trajectory.rule, "com_velocity") else values
 
@@ -267,9 +269,9 @@ def _contacts(motion: Motion, scenario: Scenario | None) -> list[Worst]:
     moves = np.diff(points, axis=1, prepend=points[:, :1])
     slips = np.linalg.norm(np.einsum("ckxt,ckx->ckt", tangents, moves), axis=2)
     names = motion.robot.contact_names
-    raised = heights
-    if rules.instant(motion.trajectory.rule, "contact_forces"):  # a force of an interval acts at both of its ends
-        raised = np.maximum(heights, np.hstack([heights[:, :1], heights[:, :-1]]))
+    rule = motion.trajectory.rule
+    raised = greatest_while_acting(heights, rule)
+    slips = greatest_while_acting(slips, rule, of_intervals=True)
     return [
         worst_of("penetration", -heights, names),
         worst_of("pulling normal force", -normal, names),

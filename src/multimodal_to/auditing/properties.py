@@ -165,14 +165,16 @@ _ACTUATION_AND_CONTACT = (
         unit="N m",
         limit=0.01,
         reason="twice the default of `complementarity_max`",
-        meaning="normal force of a contact point × its height: force in the air",
+        meaning="normal force of a contact point × its height, under leapfrog the greatest height of its knot and the "
+        "two beside it, within which the force acts: force in the air",
     ),
     Property(
         name="slip under load",
         unit="m",
         limit=1e-3,
         reason="above what the default of `sliding_max` lets a point with 5 N slip: 0.4 mm along each tangent",
-        meaning="way of a contact point along the ground over an interval at whose end it carries load: "
+        meaning="way of a contact point along the ground over an interval at whose end it carries load, under leapfrog "
+        "at either end: "
         f"more than {100 * LOADED_SHARE:g} % of the weight over the number of points (iRonCub: 5 N)",
     ),
     Property(

@@ -60,7 +60,7 @@ class Property:
     second_order_limit: float | None = None  # the limit under the second-order friction cone, where it is another one
     first_order_limit: float | None = None  # the limit by an integration rule of order one, where it is another one
 
-    def limit_for(self, robot: Robot, scenario: Scenario | None, rule: str = rules.STAGGERED) -> float:
+    def limit_for(self, robot: Robot, scenario: Scenario | None, rule: str = rules.LEAPFROG) -> float:
         """Return the limit in `unit`.
 
         Args:
