@@ -4,10 +4,10 @@ The robot is a floating base whose joints follow the file. Its state is y = (x, 
 
 m ẍ = m g + Σ f_i + Σ f_j,  ḣω = Σ (p_i − x) × f_i + Σ r_j × f_j,  ω = R I⁻¹ (Rᵀ hω − A ṡ),  T̈ by the turbine's model.
 
-Contact forces f_i and throttles are constant over an interval, and are those that its end holds. Under leapfrog they are
-constant from half an interval before their knot to half an interval after it. Each f_i acts in the world where the file
-has its point p_i. Thrusts f_j turn with the base: r_j and their directions are those of the frames
-on the base that is integrated. I and A are the angular part of J_CMM in base axes, at the file's joints. Between the
+Contact forces f_i and throttles are constant over an interval, and are those that its end holds. Under leapfrog they
+are constant from half an interval before their knot to half an interval after it. Each f_i acts in the world where the
+file has its point p_i. Thrusts f_j turn with the base: r_j and their directions are those of the frames on the base
+that is integrated. I and A are the angular part of J_CMM in base axes, at the file's joints. Between the
 knots joints and points follow a cubic spline, whose error is small beside that of any rule here.
 
 No motion like this is stable without a controller. So the state starts again from the file at every knot, and runs for
@@ -224,8 +224,7 @@ class Controls:
         contacts = plan.contact_forces.reshape(len(robot.contacts), 3, -1).sum(axis=0).T[columns]
         step = (np.repeat(np.diff(plan.time), self.steps) / self.steps)[:, None]
         starts, middles, ends = (
-            robot.gravity + (contacts + part) / robot.mass
-            for part in (thrusts[:-2:2], thrusts[1::2], thrusts[2::2])
+            robot.gravity + (contacts + part) / robot.mass for part in (thrusts[:-2:2], thrusts[1::2], thrusts[2::2])
         )
         velocity = np.vstack([self.starts[:1, _V], step / 6.0 * (starts + 4.0 * middles + ends)]).cumsum(axis=0)
         gains = step * velocity[:-1] + step**2 / 6.0 * (starts + 2.0 * middles)

@@ -152,8 +152,8 @@ def greatest_while_acting(values: Array, rule: str, *, of_intervals: bool = Fals
 def contact_products(robot: Robot, trajectory: Trajectory, surface: Surface) -> tuple[Array, Array]:
     """Return what complementarity bounds [N m], (contacts, knots + 1) each: height and slip, times the normal force.
 
-    The slip is ‖tᵀ Δp‖ over an interval. Height and slip are the greatest ones of the knots and intervals that the force
-    reaches: `greatest_while_acting`.
+    The slip is ‖tᵀ Δp‖ over an interval. Height and slip are the greatest ones of the knots and intervals that the
+    force reaches: `greatest_while_acting`.
 
     Args:
         robot: the robot of the trajectory; its contact points come from forward kinematics.
@@ -266,8 +266,8 @@ def at_knots(trajectory: Trajectory, name: str) -> Array:
     """Return a quantity at the instants of the knots, (rows, knots + 1).
 
     Where a quantity is in the middles of intervals, two of these meet at a knot, and it is the mean of theirs; an
-    acceleration is that between them. After the last knot there is no interval: there it is that of the last one, and an
-    acceleration is zero.
+    acceleration is that between them. After the last knot there is no interval: there it is that of the last one, and
+    an acceleration is zero.
     """
     values: Array = getattr(trajectory, name)
     before = rules.instant(trajectory.rule, name)
@@ -314,10 +314,10 @@ def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
     τ = M ν̇ + C ν + g − Σ Jᵀ f by RNEA: the wrench left for the base [N, N m], which is zero on a true motion, then the
     joint torques [N m]. All is at the instants of the knots: `at_knots`, `accelerations_at_knots`.
 
-    Where velocities are in the middles of intervals, the velocity jumps at a knot, from ν⁻ to ν⁺. Each holds for half of
-    the time from middle to middle. So the velocity products there are the mean of those of both, not those of the mean
-    velocity ν̄. C ν is a quadratic form c(ν), so this is ½ (c(ν⁻) + c(ν⁺)) = c(ν̄) + c(½ (ν⁺ − ν⁻)). It is what the
-    momentum's rows say, and the wrench left for the base is then of a higher order in Δt.
+    Where velocities are in the middles of intervals, the velocity jumps at a knot, from ν⁻ to ν⁺. Each holds for half
+    of the time from middle to middle. So the velocity products there are the mean of those of both, not those of the
+    mean velocity ν̄. C ν is a quadratic form c(ν), so this is ½ (c(ν⁻) + c(ν⁺)) = c(ν̄) + c(½ (ν⁺ − ν⁻)). It is what
+    the momentum's rows say, and the wrench left for the base is then of a higher order in Δt.
     """
     robot, count = robot.with_jets(trajectory.jet_names), trajectory.time.size
     names = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
