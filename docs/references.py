@@ -15,7 +15,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from multimodal_to.adam import urdf
-from multimodal_to.auditing import PROPERTIES, Judged, Property
+from multimodal_to.auditing import PROPERTIES, Judged, Of, Property
 from multimodal_to.files.keys import Key
 from multimodal_to.files.reading import LARGEST_TOML
 from multimodal_to.models.robot import load_robot
@@ -153,9 +153,15 @@ def properties() -> str:
 
 
 def _limit(entry: Property) -> str:
-    share = "× weight" if entry.of_weight else "× standing height" if entry.of_height else entry.unit
-    others = {"second-order cone": entry.second_order_limit, "rule of order one": entry.first_order_limit}
-    parts = [f"{entry.limit:g} {share}", *(f"{name} {limit:g} {share}" for name, limit in others.items() if limit)]
+    share = entry.unit if entry.of is Of.UNIT else entry.of.value
+    margin = "" if entry.margin is None else f"`margins.{entry.margin}` + "
+    others = {
+        "second-order cone": entry.second_order_limit,
+        "rule of order one": entry.first_order_limit,
+        "no such margin": entry.unasked and entry.unasked + entry.limit,
+    }
+    amounts = [f"{margin}{entry.limit:g}", *(f"{name} {limit:g}" for name, limit in others.items() if limit)]
+    parts = [f"{amount} {share}" for amount in amounts]
     return "; ".join(part.removesuffix(" 1") for part in parts)
 
 

@@ -205,7 +205,7 @@ def test_a_rule_of_order_one_has_limits_of_its_own(ironcub, take_off):
     )
     for name in names:
         entry = PROPERTIES[name]
-        size = ironcub.standing_height if entry.of_height else 1.0
+        size = entry.of.size(ironcub)
         assert first[name].limit == pytest.approx(entry.first_order_limit * size)
         assert second[name].limit == pytest.approx(entry.limit * size)
         assert np.isfinite(first[name].worst)

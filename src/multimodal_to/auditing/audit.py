@@ -14,6 +14,7 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Finding, Motion, Worst, largest, worst_of
 from multimodal_to.auditing.integrator import integrator_findings
+from multimodal_to.auditing.margins import margin_findings
 from multimodal_to.auditing.properties import GAPS, PROPERTIES, check_allowances
 from multimodal_to.auditing.self_collision import link_findings
 from multimodal_to.auditing.task import task_findings
@@ -93,6 +94,7 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         *thrust_findings(robot, trajectory),
         *integrator_findings(motion),
         *link_findings(robot, trajectory),
+        *margin_findings(motion, scenario),
         *(task_findings(motion, scenario) if scenario else ()),
     )
     findings = _findings(worst, motion, scenario)
@@ -112,7 +114,7 @@ def _findings(worst: Sequence[Worst], motion: Motion, scenario: Scenario | None)
     Args:
         worst: one for each property, in order.
         motion: whose robot and integration rule a limit may depend on.
-        scenario: whose allowances may widen a limit.
+        scenario: whose margins set a limit, and whose allowances may widen one.
 
     Raises:
         InputError: the scenario allows more of a property that is not judged.
@@ -227,7 +229,7 @@ def _integration(motion: Motion) -> list[Worst]:
     """Compare what a quantity gains over an interval with the rate that the interval's end holds, times Δt."""
     trajectory, steps = motion.trajectory, np.diff(motion.trajectory.time)
     findings = []
-    for name, rate, _, _ in GAPS:
+    for name, rate, *_ in GAPS:
         gaps = np.diff(getattr(trajectory, name), axis=1) - getattr(trajectory, rate)[:, 1:] * steps
         findings.append(worst_of(f"gap of {name}", largest(gaps), first=1))
     rotations = motion.base[:, :3, :3]
