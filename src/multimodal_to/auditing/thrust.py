@@ -45,12 +45,12 @@ def thrust_findings(robot: Robot, trajectory: Trajectory) -> list[Worst]:
 
 def _rates(robot: Robot, trajectory: Trajectory) -> Array:
     """Return Ṫ of each jet at the knots [N/s], (jets, knots + 1)."""
-    rates, steps = trajectory.thrust_rate, np.diff(trajectory.time, prepend=trajectory.time[0])
+    rates, time = trajectory.thrust_rate, trajectory.time
     accelerations = [
         jet.model.acceleration(trajectory.thrust[row], rates[row], trajectory.throttle[row])
         for row, jet in enumerate(robot.jets)
     ]
-    return np.asarray(rates + rules.instant(trajectory.rule, "thrust_rate") * steps * np.array(accelerations))
+    return np.asarray(rates + (time - trajectory.times("thrust_rate")) * np.array(accelerations))
 
 
 def _advance(step: cs.Function, state: Array, parameters: Array) -> Array:
