@@ -15,7 +15,7 @@ from multimodal_to.auditing.findings import Motion
 from multimodal_to.auditing.margins import GLIDE_HEIGHT, GLIDE_SPEED, margin_findings, pressure_shares
 from multimodal_to.auditing.properties import judged
 from multimodal_to.models.contact import DESCENT_RATE
-from multimodal_to.models.sole import PRESSURE_SLACK, soles
+from multimodal_to.models.sole import PRESSURE_SLACK, Sole, soles
 from multimodal_to.scenarios.data import to_json
 from multimodal_to.scenarios.scenario import Margins
 from multimodal_to.trajectory import QUANTITIES, Trajectory, rules
@@ -125,7 +125,9 @@ def test_a_foot_with_hardly_any_load_counts_as_zero(ironcub):
 def test_the_share_is_the_gauge_of_the_sole_by_linear_programming(ironcub):
     """Against the least Σ λ with Σ λ corner = centre of pressure, for loads beside which the slack is nothing."""
     generator = np.random.default_rng(7)
-    for sole in soles(ironcub):
+    three = np.array([[0.09, 0.01], [-0.03, 0.04], [-0.06, -0.05]])  # toes on one side, a heel, none opposite another
+    lopsided = Sole(foot="left", members=(0, 1, 2), places=three - three.mean(axis=0), corners=(0, 1, 2))
+    for sole in (*soles(ironcub), lopsided):
         normal = 1e9 * generator.uniform(0.0, 1.0, (len(sole.members), 20)) ** 3
         corners = sole.places[list(sole.corners)].T
         for share, load in zip(pressure_shares(ironcub, sole, normal), normal.T, strict=True):
@@ -193,6 +195,13 @@ def test_a_foot_that_skims_the_ground_is_found_and_one_that_is_lifted_is_not(iro
     assert found(ironcub, moved(ironcub, way, low, load=1.0, rule=rule), scenario)["gliding speed"].worst == 0.0
 
 
+def test_a_foot_that_is_lifted_or_set_down_over_an_interval_does_not_glide(ironcub):
+    way, height = np.zeros(KNOTS + 1), np.zeros(KNOTS + 1)
+    way[KNOT:], way[KNOT + 1 :] = 0.02, 0.04
+    height[KNOT] = 2.0 * GLIDE_HEIGHT * ironcub.standing_height  # up in one interval, down in the next
+    assert found(ironcub, moved(ironcub, way, height, load=0.0), task(torque=0.9))["gliding speed"].worst == 0.0
+
+
 def test_a_foot_that_stands_when_an_interval_begins_does_not_glide_over_it(ironcub):
     """Under leapfrog a force acts half an interval after its knot; under backward Euler it ends there."""
     way, load = np.zeros(KNOTS + 1), np.zeros(KNOTS + 1)
@@ -208,15 +217,15 @@ def test_a_foot_that_stands_when_an_interval_begins_does_not_glide_over_it(ironc
 # ------------------------------------------------------------ throttles
 
 
-def test_a_throttle_that_jumps_is_found_and_one_that_a_turbine_follows_holds(ironcub):
+@pytest.mark.parametrize("before", [0.0, 100.0], ids=["up", "down"])
+def test_a_throttle_that_jumps_is_found_and_one_that_a_turbine_follows_holds(ironcub, before):
     trajectory, scenario = moved(ironcub), task(torque=0.9)
     throttle = np.tile(np.linspace(0.0, 100.0, KNOTS + 1), (len(ironcub.jets), 1))
     entry = PROPERTIES["throttle rate"]
     steady = found(ironcub, replace(trajectory, throttle=throttle), scenario)[entry.name]
     assert steady.worst == pytest.approx(100.0 / KNOTS / STEP)
     assert steady.worst < entry.limit_for(ironcub, scenario)
-    throttle[1, KNOT:] = 100.0
-    throttle[1, :KNOT] = 0.0
+    throttle[1, :KNOT], throttle[1, KNOT:] = before, 100.0 - before
     jump = found(ironcub, replace(trajectory, throttle=throttle), scenario)[entry.name]
     assert jump.worst == pytest.approx(100.0 / STEP)
     assert jump.worst > entry.limit_for(ironcub, scenario)
