@@ -1,14 +1,14 @@
 """Of which order the integration rules are: errors against an accurate integrator on Δt, Δt/2 and Δt/4.
 
-    python benchmarks/refinement.py [SCENARIO | TRAJECTORY.npz | free-flight ...] [--rule backward-euler staggered]
+    python benchmarks/refinement.py [SCENARIO | TRAJECTORY.npz | free-flight ...] [--rule backward-euler leapfrog]
                                     [--into docs/mathematics.md]
-    python benchmarks/refinement.py --solve [SCENARIO ...] [--rule paper staggered] [--parts 1 2 4]
+    python benchmarks/refinement.py --solve [SCENARIO ...] [--rule paper executable] [--parts 1 2 4]
 
-The first command takes the controls of one motion as functions of time: contact forces and throttles, constant over its
-intervals, and the way of the joints and contact points, by a cubic spline. From up to `--starts` of its knots each rule
-goes through a stretch of 2 √(L/g) in steps of Δt, Δt/2 and Δt/4. Its steps are the rows of the optimal control problem.
-The errors are those at the stretch's end, the greatest over all starts. A bundled scenario is solved first, by the
-staggered rule; a trajectory file is taken as it is. `free-flight` is the robot in the air, without thrust, that
+The first command takes the controls of one motion as functions of time: contact forces and throttles, constant over the
+time in which each acts, and the way of the joints and contact points, by a cubic spline. From up to `--starts` of its
+knots each rule goes through a stretch of 2 √(L/g) in steps of Δt, Δt/2 and Δt/4. Its steps are the rows of the optimal
+control problem. The errors are those at the stretch's end, the greatest over all starts. A bundled scenario is solved
+first, by leapfrog; a trajectory file is taken as it is. `free-flight` is the robot in the air, without thrust, that
 tumbles and moves its joints. This is the order of the rule alone, since all steps have the same controls.
 
 The second command solves each scenario with N, 2N and 4N intervals, each from the answer before, and gives what the
@@ -38,7 +38,7 @@ from multimodal_to.auditing.findings import Motion
 from multimodal_to.auditing.integrator import STRETCH, Controls, angles, natural_time, spline
 from multimodal_to.models.robot import Robot
 from multimodal_to.ocp import constraints
-from multimodal_to.ocp.integration import BACKWARD_EULER, STAGGERED, IntegrationRule, Interval
+from multimodal_to.ocp.integration import BACKWARD_EULER, LEAPFROG, IntegrationRule, Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.trajectory import QUANTITIES, Trajectory, rules
@@ -46,10 +46,10 @@ from multimodal_to.trajectory.derived import frame_poses
 
 FORMULATIONS: dict[str, Callable[[], mt.Formulation]] = {
     "paper": mt.Formulation.paper,
-    "staggered": mt.Formulation.staggered,
+    "executable": mt.Formulation.executable,
 }
 """What `--solve` can solve, by name."""
-RULES: dict[str, IntegrationRule] = {"backward-euler": BACKWARD_EULER, "staggered": STAGGERED}
+RULES: dict[str, IntegrationRule] = {"backward-euler": BACKWARD_EULER, "leapfrog": LEAPFROG}
 FREE_FLIGHT = "free-flight"
 PARTS = (1, 2, 4)
 BEGIN, END = "<!-- refinement: begin -->", "<!-- refinement: end -->"
@@ -210,9 +210,15 @@ def _flow(
 
     def given(index: int) -> np.ndarray:
         before = joints[:, index - 1] if index else joints[:, 0]
-        columns = first + (index + parts - 1) // parts  # of the interval that ends here, or that this is within
         parts_given = [joints[:, index], (joints[:, index] - before) / dt, contacts[:, index]]
-        return np.hstack([*parts_given, plan.contact_forces[:, columns].T, plan.throttle[:, columns].T])
+        return np.hstack([*parts_given, acting(plan.contact_forces, index), acting(plan.throttle, index)])
+
+    def acting(values: np.ndarray, index: int) -> np.ndarray:
+        """Return what acts just before an instant; by leapfrog, which has it in the middle, the mean with just after."""
+        share = index / parts - rules.acts_after(plan.rule)
+        until = values[:, first + int(np.ceil(share))].T
+        since = values[:, np.minimum(first + int(np.floor(share)) + 1, plan.knots)].T
+        return 0.5 * (until + since) if rules.acts_after(rule.name) else until
 
     jets, state = len(robot.jets), controls.starts[first].copy()
     back = controls.slope(state, 2 * controls.steps * first, first) * dt
@@ -228,7 +234,7 @@ def _flow(
 
 
 def controls_of(name: str) -> Controls:
-    """Return the controls of a bundled scenario, solved by the staggered rule, of a file, or of the free flight."""
+    """Return the controls of a bundled scenario, solved by leapfrog, of a file, or of the free flight."""
     if name == FREE_FLIGHT:
         robot = mt.load_robot("ironcub").with_jets(())
         plan = free_flight(robot)
@@ -236,7 +242,7 @@ def controls_of(name: str) -> Controls:
         plan = Trajectory.load(name)
         robot = mt.load_robot(plan.robot).with_jets(plan.jet_names)
     else:
-        problem = mt.build(mt.load_robot("ironcub"), scenarios.find(name), mt.Formulation.staggered())
+        problem = mt.build(mt.load_robot("ironcub"), scenarios.find(name), mt.Formulation.executable())
         plan, robot = mt.solve(problem).trajectory, problem.robot
     return Controls.of(Motion.of(robot, plan), steps=16)
 
@@ -291,8 +297,9 @@ def markdown(found: dict[str, list[Study]]) -> str:
                 if max(column) <= ROUNDING:
                     cells.append("exact" if max(column) > 0.0 else "–")
                 else:
-                    order = orders(column, entry.parts)[-1]
-                    cells.append(f"{', '.join(f'{value:.3g}' for value in column)}; order {order:.1f}")
+                    shown = ", ".join(f"{value:.3g}" if value > ROUNDING else "exact" for value in column)
+                    told = min(column[-2:]) > ROUNDING
+                    cells.append(f"{shown}; order {orders(column, entry.parts)[-1]:.1f}" if told else shown)
             lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from multimodal_to.adam import urdf
-from multimodal_to.auditing import PROPERTIES, Judged, Property
+from multimodal_to.auditing import PROPERTIES, Judged, Of, Property
 from multimodal_to.files.keys import Key
 from multimodal_to.files.reading import LARGEST_TOML
 from multimodal_to.models.robot import load_robot
@@ -53,14 +53,14 @@ def table(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def quantities() -> str:
     """Return the quantities of a trajectory."""
     return table(
-        ("name", "shape", "unit", "axes of", "staggered: where in the interval", "meaning"),
+        ("name", "shape", "unit", "axes of", "leapfrog: where in the interval", "meaning"),
         [
             (
                 f"`{name}`",
                 _shape(quantity.rows, _COUNTS[quantity.of]),
                 quantity.unit,
                 quantity.frame or "–",
-                _INSTANTS[rules.instant(rules.STAGGERED, name)],
+                _INSTANTS[rules.instant(rules.LEAPFROG, name)],
                 quantity.meaning,
             )
             for name, quantity in QUANTITIES.items()
@@ -153,9 +153,15 @@ def properties() -> str:
 
 
 def _limit(entry: Property) -> str:
-    share = "× weight" if entry.of_weight else "× standing height" if entry.of_height else entry.unit
-    others = {"second-order cone": entry.second_order_limit, "rule of order one": entry.first_order_limit}
-    parts = [f"{entry.limit:g} {share}", *(f"{name} {limit:g} {share}" for name, limit in others.items() if limit)]
+    share = entry.unit if entry.of is Of.UNIT else entry.of.value
+    margin = "" if entry.margin is None else f"`margins.{entry.margin}` + "
+    others = {
+        "second-order cone": entry.second_order_limit,
+        "rule of order one": entry.first_order_limit,
+        "no such margin": entry.unasked and entry.unasked + entry.limit,
+    }
+    amounts = [f"{margin}{entry.limit:g}", *(f"{name} {limit:g}" for name, limit in others.items() if limit)]
+    parts = [f"{amount} {share}" for amount in amounts]
     return "; ".join(part.removesuffix(" 1") for part in parts)
 
 
@@ -183,9 +189,10 @@ def keys(every: Iterable[Key]) -> str:
 
 
 def terms() -> str:
-    """Return the terms of the paper's formulation: constraints and costs, each with its formula."""
+    """Return the terms of the two formulations: constraints and costs, each with its formula."""
     formulation = Formulation.paper()
-    staggered = [term for term in Formulation.staggered().constraints if term not in formulation.terms]
+    known = {term.name for term in formulation.terms}
+    more = [term for term in Formulation.executable().terms if term.name not in known]
     robot = load_robot("ironcub")
     tasks = {
         name: Parameters.of(robot, make(), robot.home) for name, make in SCENARIOS.items()
@@ -194,10 +201,10 @@ def terms() -> str:
         ("constraint", "formula", "set", "unit", "where"),
         [
             (f"`{term.name}`", _formula(term), _set(term, tasks["take-off"]), _units(term), _places(term, tasks))
-            for term in (*formulation.constraints, *staggered)
+            for term in (*formulation.constraints, *(term for term in more if isinstance(term, Constraint)))
         ],
     )
-    names = ", ".join(f"`{term.name}`" for term in staggered)
+    names = ", ".join(f"`{term.name}`" for term in more)
     costs = table(
         ("cost", "residual", "unit", "charged", "how"),
         [
@@ -208,11 +215,11 @@ def terms() -> str:
                 _places(term, tasks),
                 "per second" if term.per_second else "once",
             )
-            for term in formulation.costs
+            for term in (*formulation.costs, *(term for term in more if isinstance(term, Cost)))
         ],
     )
     return (
-        f"## Constraints\n\n{constraints}\n\nOnly the staggered rule has {names}.\n\n## Costs\n\n"
+        f"Only `Formulation.executable()` has {names}.\n\n## Constraints\n\n{constraints}\n\n## Costs\n\n"
         "A cost adds weight × |residual|² to the objective. If it is charged per second, it is multiplied by Δt. The "
         f"weight is the key of the same name in `weights` of the scenario.\n\n{costs}"
     )

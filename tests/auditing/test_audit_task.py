@@ -128,8 +128,9 @@ def test_thrusts_that_follow_their_dynamics_closely_are_not_off_and_those_that_d
     interval, horizon = thrust_findings(ironcub, spoiled(true, "thrust", 1, 7, 15.0))
     assert interval.worst == pytest.approx(15.0, rel=0.1)
     assert interval.body == ironcub.jet_names[1]
-    assert interval.worst > PROPERTIES[interval.name].limit
-    assert horizon.worst < PROPERTIES[horizon.name].limit
+    limits = {name: PROPERTIES[name].limit_for(ironcub, None, true.rule) for name in (interval.name, horizon.name)}
+    assert interval.worst > limits[interval.name]
+    assert horizon.worst < limits[horizon.name]
     assert horizon.knot == 7
 
 
@@ -141,7 +142,7 @@ def test_backward_euler_is_off_by_a_few_newtons(ironcub, take_off):
 
 def test_thrusts_that_run_away_are_infinitely_off_and_a_robot_without_jets_has_none(ironcub, take_off):
     (_, horizon) = thrust_findings(ironcub, spoiled(take_off.trajectory, "thrust_rate", 0, 0, 1e6))
-    assert horizon.worst > 1e3 > PROPERTIES[horizon.name].limit
+    assert horizon.worst > 1e3 > PROPERTIES[horizon.name].limit_for(ironcub, None, take_off.trajectory.rule)
     none = np.zeros((0, take_off.trajectory.knots + 1))
     names = ("thrust", "thrust_rate", "thrust_acceleration", "throttle")
     bare = replace(take_off.trajectory, jet_names=(), **dict.fromkeys(names, none))

@@ -64,9 +64,10 @@ def stretch(robot):
     return round(STRETCH * natural_time(robot) / STEP)
 
 
-def test_a_throw_by_the_staggered_rule_is_exact(tmp_path):
+@pytest.mark.parametrize("rule", [rules.LEAPFROG, rules.STAGGERED])
+def test_a_throw_with_velocities_in_the_middles_of_intervals_is_exact(rule, tmp_path):
     robot = drone(tmp_path, jets=False)
-    for entry in found(robot, thrown(robot, rules.STAGGERED)).values():
+    for entry in found(robot, thrown(robot, rule)).values():
         assert entry.worst < 1e-12
 
 
@@ -81,11 +82,11 @@ def test_a_throw_by_backward_euler_falls_half_an_interval_early(tmp_path):
     assert entries["base off integrator, stretch"].worst < 1e-12
 
 
-def hovering(robot):
+def hovering(robot, rule=rules.LEAPFROG):
     """Upright, with thrusts that carry the weight and throttles that keep them."""
     thrust = robot.weight / len(robot.jets)
     throttle = np.array([[jet.model.steady_throttle(thrust)] for jet in robot.jets])
-    return motion(robot, rules.STAGGERED, thrust=thrust, throttle=throttle)
+    return motion(robot, rule, thrust=thrust, throttle=throttle)
 
 
 def test_a_hover_stays_where_it_is(tmp_path):
@@ -94,31 +95,45 @@ def test_a_hover_stays_where_it_is(tmp_path):
         assert entry.worst < 1e-9
 
 
-def test_a_push_that_the_plan_does_not_follow_moves_the_com_as_newton_says(tmp_path):
-    """A force F over one interval leaves a speed F Δt / m, from the middle of the interval on."""
-    robot, push, interval = drone(tmp_path), 30.0, 5
-    plan = hovering(robot)
-    plan.contact_forces[2::3, interval] = push / len(robot.contacts)
+PUSHES = pytest.mark.parametrize(
+    ("rule", "first", "lost", "middle"),
+    [(rules.STAGGERED, 4, 0.5, 4.5), (rules.LEAPFROG, 5, 0.125, 5.0)],
+    ids=["staggered", "leapfrog"],
+)
+"""What column 5 does: from which knot its stretch leads farthest, how much of the stretch is lost, when its middle is.
+
+Under leapfrog it acts from half an interval before knot 5 to half an interval after it. A stretch from that knot starts
+with half of the speed, and the other half comes within half an interval: 1/8 of an interval is lost.
+"""
+
+
+@PUSHES
+def test_a_push_that_the_plan_does_not_follow_moves_the_com_as_newton_says(rule, first, lost, middle, tmp_path):
+    """A force F for Δt leaves a speed F Δt / m, from the middle of the time in which it acts on."""
+    robot, push = drone(tmp_path), 30.0
+    plan = hovering(robot, rule)
+    plan.contact_forces[2::3, 5] = push / len(robot.contacts)
     entries = found(robot, plan)
     gain = push / robot.mass * STEP**2
     near, far = entries["CoM off integrator, stretch"], entries["CoM off integrator, horizon"]
-    assert near.worst == pytest.approx(gain * (stretch(robot) - 0.5), rel=1e-6)
-    assert near.knot == interval - 1 + stretch(robot)
-    assert far.worst == pytest.approx(gain * (KNOTS - interval + 0.5), rel=1e-6)
+    assert near.worst == pytest.approx(gain * (stretch(robot) - lost), rel=1e-6)
+    assert near.knot == first + stretch(robot)
+    assert far.worst == pytest.approx(gain * (KNOTS - middle), rel=1e-6)
     assert entries["base off integrator, stretch"].worst < 1e-9
 
 
-def test_a_moment_that_the_plan_does_not_follow_turns_the_base_as_euler_says(tmp_path):
-    """A couple about the vertical over one interval leaves a rate M Δt / I, from the middle of the interval on."""
-    robot, push, interval, arm = drone(tmp_path, arm=0.2), 2.0, 5, 0.2
-    plan = hovering(robot)
+@PUSHES
+def test_a_moment_that_the_plan_does_not_follow_turns_the_base_as_euler_says(rule, first, lost, middle, tmp_path):
+    """A couple about the vertical for Δt leaves a rate M Δt / I, from the middle of the time in which it acts on."""
+    robot, push, arm = drone(tmp_path, arm=0.2), 2.0, 0.2
+    plan = hovering(robot, rule)
     feet = [frame_poses(robot, plan, name)[0, :3, 3] for name in robot.contact_names]
     for row, foot in enumerate(feet):
-        plan.contact_forces[3 * row + 1, interval] = push * np.sign(foot[0])
+        plan.contact_forces[3 * row + 1, 5] = push * np.sign(foot[0])
     entry = found(robot, plan)["base off integrator, stretch"]
     gain = len(feet) * push * arm / 0.4 * STEP**2  # 0.4 kg m² is the drone's inertia about the vertical
-    assert entry.worst == pytest.approx(gain * (stretch(robot) - 0.5), rel=1e-6)
-    assert entry.knot == interval - 1 + stretch(robot)
+    assert entry.worst == pytest.approx(gain * (stretch(robot) - lost), rel=1e-6)
+    assert entry.knot == first + stretch(robot)
 
 
 def test_a_spinning_body_keeps_its_energy(tmp_path):
@@ -199,13 +214,13 @@ def test_the_angle_between_attitudes_does_not_depend_on_signs_and_lengths():
 
 def test_a_rule_of_order_one_has_limits_of_its_own(ironcub, take_off):
     names = [name for name, entry in PROPERTIES.items() if entry.first_order_limit is not None]
-    assert len(names) == 3
+    assert len(names) == 5
     first, second = (
-        audit(ironcub, replace(take_off.trajectory, rule=rule)) for rule in (rules.BACKWARD_EULER, rules.STAGGERED)
+        audit(ironcub, replace(take_off.trajectory, rule=rule)) for rule in (rules.BACKWARD_EULER, rules.LEAPFROG)
     )
     for name in names:
         entry = PROPERTIES[name]
-        size = ironcub.standing_height if entry.of_height else 1.0
+        size = entry.of.size(ironcub)
         assert first[name].limit == pytest.approx(entry.first_order_limit * size)
         assert second[name].limit == pytest.approx(entry.limit * size)
         assert np.isfinite(first[name].worst)

@@ -14,7 +14,7 @@ from multimodal_to import scenarios
 from multimodal_to.auditing.findings import Motion
 from multimodal_to.auditing.integrator import Controls
 
-ORDERS = {"backward-euler": 1, "staggered": 2}
+ORDERS = {"backward-euler": 1, "leapfrog": 2}
 """Each rule with its order."""
 
 
@@ -73,7 +73,7 @@ def test_plans_on_finer_steps_are_solved_and_shown_with_their_orders(monkeypatch
     )
     monkeypatch.setattr(scenarios, "find", lambda name: squat)
     monkeypatch.setenv("COLUMNS", "160")
-    monkeypatch.setattr(sys, "argv", ["refinement", "--solve", "squat", "--rule", "staggered", "--parts", "1", "2"])
+    monkeypatch.setattr(sys, "argv", ["refinement", "--solve", "squat", "--rule", "executable", "--parts", "1", "2"])
     refinement.main()
     coarse, fine = (line for line in capsys.readouterr().out.splitlines() if "│ squat" in line)
     assert "│ 4 " in coarse
@@ -89,7 +89,7 @@ def test_a_study_of_controls_prints_each_rule_on_each_step_and_fills_a_page(monk
     monkeypatch.setattr(sys, "argv", ["refinement", "free-flight", "--parts", "1", "2", "--into", str(page)])
     refinement.main()
     lines = [line for line in capsys.readouterr().out.splitlines() if "free-flight" in line]
-    assert [line.split("│")[2].strip() for line in lines] == ["backward-euler"] * 2 + ["staggered"] * 2
+    assert [line.split("│")[2].strip() for line in lines] == ["backward-euler"] * 2 + ["leapfrog"] * 2
     assert "(1.0)" in lines[1]
     assert "(2.0)" in lines[3]
     text = page.read_text(encoding="utf-8")
@@ -98,7 +98,7 @@ def test_a_study_of_controls_prints_each_rule_on_each_step_and_fills_a_page(monk
     assert "old" not in text
     first, second = (line for line in text.splitlines() if line.startswith("| free-flight"))
     assert first.endswith("; order 1.0 | – |")
-    assert "| staggered | 50, 25 | exact | " in second
+    assert "| leapfrog | 50, 25 | exact | " in second
     page.write_text("no marks", encoding="utf-8")
     with pytest.raises(SystemExit, match="lacks the marks"):
         refinement.main()
@@ -108,4 +108,4 @@ def test_a_rule_that_does_not_exist_is_refused(monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["refinement", "--rule", "trapezoid"])
     with pytest.raises(SystemExit):
         refinement.main()
-    assert "no rule trapezoid; expected backward-euler, staggered" in capsys.readouterr().err
+    assert "no rule trapezoid; expected backward-euler, leapfrog" in capsys.readouterr().err

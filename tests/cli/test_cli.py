@@ -403,7 +403,7 @@ def with_own_terms(ironcub, tmp_path_factory):
     return motion.save(tmp_path_factory.mktemp("own") / "trajectory.npz")
 
 
-OWN_TERMS = "terms of its own: slow_turns; left out of the paper's: posture"
+OWN_TERMS = "terms of its own: slow_turns; left out: posture"
 
 
 def test_a_solve_with_own_terms_is_gone_on_from_in_its_script_only(with_own_terms):

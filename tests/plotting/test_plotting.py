@@ -321,6 +321,11 @@ def test_bad_figures_end_in_one_sentence(figure, robot, trajectory, tmp_path):
 
 
 @pytest.fixture(scope="module")
+def leapfrog(trajectory):
+    return replace(trajectory, rule=rules.LEAPFROG)
+
+
+@pytest.fixture(scope="module")
 def staggered(trajectory):
     return replace(trajectory, rule=rules.STAGGERED)
 
@@ -332,17 +337,42 @@ def test_a_backward_euler_motion_is_drawn_at_its_knots(robot, trajectory):
         assert axes.lines[0].get_drawstyle() == "default"
 
 
-def test_velocities_of_a_staggered_motion_are_drawn_in_the_middles_of_its_intervals(robot, staggered):
-    middles = (staggered.time[1:] + staggered.time[:-1]) / 2
-    position, velocity = plotting.plot_com(robot, staggered).axes[:2]
-    np.testing.assert_array_equal(position.lines[0].get_xdata(), staggered.time)
+def test_velocities_by_leapfrog_are_drawn_in_the_middles_of_intervals(robot, leapfrog):
+    middles = (leapfrog.time[1:] + leapfrog.time[:-1]) / 2
+    position, velocity = plotting.plot_com(robot, leapfrog).axes[:2]
+    np.testing.assert_array_equal(position.lines[0].get_xdata(), leapfrog.time)
     np.testing.assert_allclose(velocity.lines[0].get_xdata(), middles, atol=1e-12)
-    np.testing.assert_array_equal(velocity.lines[0].get_ydata(), staggered.com_velocity[0, 1:])
-    momentum, rate = plotting.plot_momentum(robot, staggered).axes[:2]
+    np.testing.assert_array_equal(velocity.lines[0].get_ydata(), leapfrog.com_velocity[0, 1:])
+    momentum, rate = plotting.plot_momentum(robot, leapfrog).axes[:2]
     np.testing.assert_allclose(momentum.lines[0].get_xdata(), middles, atol=1e-12)
-    np.testing.assert_allclose(rate.lines[0].get_xdata(), staggered.time[:-1], atol=1e-12)
-    speeds = plotting.plot_joints(robot, staggered).axes[-1]
+    np.testing.assert_allclose(rate.lines[0].get_xdata(), leapfrog.time[:-1], atol=1e-12)
+    speeds = plotting.plot_joints(robot, leapfrog).axes[-1]
     np.testing.assert_allclose(speeds.lines[0].get_xdata(), middles, atol=1e-12)
+
+
+def test_forces_and_throttles_by_leapfrog_are_drawn_at_its_knots(robot, leapfrog):
+    throttle, _, force = plotting.plot_forces(robot, leapfrog).axes
+    for axes, values in ((throttle, leapfrog.throttle[0]), (force, leapfrog.vertical_contact_force())):
+        line = axes.lines[0]
+        np.testing.assert_array_equal(line.get_xdata(), leapfrog.time)
+        np.testing.assert_array_equal(line.get_ydata(), values)
+        assert line.get_drawstyle() == "default"
+
+
+@pytest.mark.parametrize(("rule", "later"), [(rules.BACKWARD_EULER, 0.0), (rules.LEAPFROG, 0.5)])
+def test_bars_of_the_timeline_span_the_time_in_which_forces_act(robot, trajectory, rule, later):
+    forces = np.zeros_like(trajectory.contact_forces)
+    forces[2, 4:9] = 50.0
+    timeline = plotting.plot_contacts(robot, replace(trajectory, rule=rule, contact_forces=forces)).axes[0]
+    (path,) = [path for bars in timeline.collections for path in bars.get_paths()]
+    step = DURATION / (trajectory.time.size - 1)
+    ends = path.vertices[:, 0]
+    assert (ends.min(), ends.max()) == pytest.approx(((3 + later) * step, (8 + later) * step))
+
+
+def test_bands_of_flight_by_leapfrog_begin_when_the_last_force_ends(robot, leapfrog):
+    for axes in plotting.plot_forces(robot, leapfrog).axes:
+        assert bands(axes) == [pytest.approx((LIFT_OFF - DURATION / 40, DURATION))]
 
 
 def test_forces_and_throttles_of_a_staggered_motion_are_steps_over_its_intervals(robot, staggered):
@@ -361,7 +391,7 @@ def test_forces_and_throttles_of_a_staggered_motion_are_steps_over_its_intervals
         assert axes.lines[0].get_drawstyle() == "default"
 
 
-def test_bands_of_flight_fill_the_intervals_without_force(robot, staggered):
+def test_bands_of_flight_of_a_staggered_file_fill_the_intervals_without_force(robot, staggered):
     for axes in plotting.plot_forces(robot, staggered).axes:
         assert bands(axes) == [pytest.approx((LIFT_OFF - DURATION / 20, DURATION))]
 
@@ -391,7 +421,7 @@ def test_a_joint_without_an_effort_limit_has_no_dashed_line(robot, trajectory):
     assert torque_panel(strong, trajectory, "l_elbow") == ("l_elbow", set())
 
 
-def test_the_last_knot_of_a_staggered_motion_has_no_torque(robot, staggered):
-    drawn = plotting.plot_torques(robot, staggered).axes[0].lines[0].get_ydata()
+def test_the_last_knot_by_leapfrog_has_no_torque(robot, leapfrog):
+    drawn = plotting.plot_torques(robot, leapfrog).axes[0].lines[0].get_ydata()
     assert np.isnan(drawn[-1])
     assert np.isfinite(drawn[:-1]).all()

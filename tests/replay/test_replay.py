@@ -238,7 +238,16 @@ def test_arrows_start_at_the_contact_points_and_point_along_the_forces(robot, tr
         assert not any(visible[KNOTS // 2 :])
 
 
-def test_an_arrow_at_a_knot_is_the_mean_of_the_intervals_that_meet_there(robot, trajectory, tmp_path):
+def test_an_arrow_by_leapfrog_is_the_force_of_its_knot(robot, trajectory, tmp_path):
+    motion = replace(trajectory, rule=rules.LEAPFROG)
+    shown = Stage(replay.write_html(robot, motion, tmp_path / "l.html", meshes=False).read_text(encoding="utf-8"))
+    name, force = trajectory.contact_names[0], trajectory.per_contact("contact_forces")[0]
+    for knot in range(5):
+        expected = effects.ARROW_LENGTH * np.linalg.norm(force[:, knot]) / robot.weight
+        assert shown.value(shown.find(f"contact_forces/{name}"), "scale", knot)[2] == pytest.approx(expected)
+
+
+def test_an_arrow_at_a_knot_is_the_mean_of_the_intervals_that_meet_there_in_an_older_file(robot, trajectory, tmp_path):
     staggered = replace(trajectory, rule=rules.STAGGERED)
     shown = Stage(replay.write_html(robot, staggered, tmp_path / "s.html", meshes=False).read_text(encoding="utf-8"))
     name, force = trajectory.contact_names[0], trajectory.per_contact("contact_forces")[0]

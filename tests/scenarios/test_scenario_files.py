@@ -13,6 +13,7 @@ from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.terrain import FlatGround, HeightField, Plane, Stairs
 from multimodal_to.scenarios import Start, Terminal, Weights
 from multimodal_to.scenarios.data import from_dict, stored, to_dict, to_json
+from multimodal_to.scenarios.scenario import Margins
 from synthetic import take_off as synthetic_take_off
 
 
@@ -187,3 +188,20 @@ def test_a_trajectory_keeps_its_scenario_as_text_in_its_file(ironcub, scenario, 
 def test_a_kept_text_that_is_no_scenario_is_refused(ironcub, text):
     with pytest.raises(MultimodalError, match="the scenario kept with 'take-off & hover' cannot be read"):
         stored(replace(synthetic_take_off(ironcub), scenario_json=text))
+
+
+def test_a_motion_of_before_the_margins_was_not_asked_for_any(ironcub, scenario):
+    plain = to_dict(scenario)
+    assert plain["margins"]["torque"] == Margins().torque > 0.0
+    motion = synthetic_take_off(ironcub)
+
+    def kept(**change):
+        return stored(replace(motion, scenario_json=json.dumps({**plain, **change})))
+
+    assert kept() == scenario
+    assert kept(margins={"pressure": 0.5}) == replace(scenario, margins=replace(Margins.none(), pressure=0.5))
+    del plain["margins"]
+    assert kept() == replace(scenario, margins=Margins.none())
+    assert from_dict(plain) == scenario  # a task that is written today and says nothing has them
+    with pytest.raises(ScenarioError, match="margins"):
+        kept(margins=3.0)

@@ -130,7 +130,7 @@ def test_velocities_of_what_happened_are_those_of_the_instants_that_the_rule_of_
     """Positions follow from velocities in the middles of intervals to second order, from those at the ends to first."""
     plan = playback.plan
     gaps = {}
-    for rule in (rules.BACKWARD_EULER, rules.STAGGERED):
+    for rule in (rules.BACKWARD_EULER, rules.LEAPFROG):
         motion = simulated_trajectory(replace(playback, plan=regrid(plan, plan.knots, rule)))
         assert motion.rule == rule
         moved = np.diff(motion.joint_positions, axis=1)
@@ -138,8 +138,8 @@ def test_velocities_of_what_happened_are_those_of_the_instants_that_the_rule_of_
         gaps[rule, "CoM"] = np.abs(
             np.diff(motion.com_position, axis=1) - motion.com_velocity[:, 1:] * np.diff(plan.time)
         ).max()
-    assert gaps[rules.STAGGERED] < 0.5 * gaps[rules.BACKWARD_EULER]
-    assert gaps[rules.STAGGERED, "CoM"] < 0.5 * gaps[rules.BACKWARD_EULER, "CoM"]
+    assert gaps[rules.LEAPFROG] < 0.5 * gaps[rules.BACKWARD_EULER]
+    assert gaps[rules.LEAPFROG, "CoM"] < 0.5 * gaps[rules.BACKWARD_EULER, "CoM"]
 
 
 def test_without_a_balance_feedback_the_take_off_tips_and_lies_still(ironcub, take_off):
@@ -318,6 +318,32 @@ def test_with_a_delay_the_motion_follows_its_forces(ironcub):
     for name in ("contact_forces", "thrust", "torques", "throttle"):
         np.testing.assert_array_equal(getattr(at_once, name), getattr(own, name))
     assert np.abs(own.com - at_once.com).max() > 0.01
+
+
+def test_by_leapfrog_the_joints_accelerate_while_the_forces_of_their_knot_act(ironcub):
+    """Throttles and forces change in the middles of intervals, where the acceleration of the planned motion does."""
+    plan = replace(synthetic_take_off(ironcub), rule=rules.LEAPFROG)
+    plan = replace(plan, joint_velocities=np.cumsum(plan.joint_positions, axis=1))
+    step, knot = plan.duration / plan.knots, 6
+    times = plan.time[knot] + step * np.array([-0.52, -0.48, 0.0, 0.48, 0.52])
+    wanted = reference(ironcub, plan, times)
+    columns = [knot - 1, knot, knot, knot, knot + 1]
+    np.testing.assert_array_equal(wanted.throttle, plan.throttle[:, columns].T)
+    np.testing.assert_array_equal(wanted.contact_forces.reshape(5, -1), plan.contact_forces[:, columns].T)
+    around = reference(ironcub, plan, np.concatenate([times - 1e-6, times + 1e-6])).joint_velocities
+    accelerations = (around[5:] - around[:5]) / 2e-6
+    expected = (np.diff(plan.joint_velocities, axis=1) / step)[:, columns].T
+    np.testing.assert_allclose(accelerations, expected, rtol=1e-4)
+
+
+def test_forces_of_what_happened_by_leapfrog_are_means_about_the_knots(ironcub, playback):
+    plan = regrid(playback.plan, playback.plan.knots, rules.LEAPFROG)
+    motion, half = simulated_trajectory(replace(playback, plan=plan)), 0.5 * plan.duration / plan.knots
+    knot = plan.knots // 2
+    for values, means in ((playback.throttle, motion.throttle), (playback.contact_forces, motion.contact_forces)):
+        rows = values.reshape(playback.time.size, -1)
+        within = (playback.time >= plan.time[knot] - half) & (playback.time < plan.time[knot] + half)
+        np.testing.assert_allclose(means[:, knot], rows[within].mean(axis=0), rtol=0.02, atol=1e-2)
 
 
 def test_a_delay_is_at_most_an_interval(ironcub):

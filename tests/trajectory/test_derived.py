@@ -10,6 +10,7 @@ from multimodal_to.errors import InputError
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.trajectory import QUANTITIES, rules
 from multimodal_to.trajectory.derived import (
+    acting_times,
     base_poses,
     contact_products,
     flight_force,
@@ -135,12 +136,91 @@ def light_of(robot):
     return replace(robot, kindyn=KinDynComputations(robot.urdf, robot.joint_names, gravity=0.5 * robot.gravity))
 
 
-# ------------------------------------------------------------------------- instants of a staggered motion
+# ------------------------------------------------------------------------- instants by leapfrog, and of older files
+
+
+@pytest.fixture(scope="module")
+def leapfrog(trajectory):
+    return replace(trajectory, rule=rules.LEAPFROG)
 
 
 @pytest.fixture(scope="module")
 def staggered(trajectory):
     return replace(trajectory, rule=rules.STAGGERED)
+
+
+def test_by_leapfrog_velocities_are_in_the_middles_of_intervals_and_forces_at_knots(trajectory, leapfrog):
+    time, step = trajectory.time, DURATION / KNOTS
+    for name in ("joint_positions", "thrust", "contact_forces", "throttle"):
+        np.testing.assert_array_equal(leapfrog.times(name), time)
+    for name in ("joint_velocities", "contact_force_rates", "thrust_rate"):
+        np.testing.assert_allclose(leapfrog.times(name), time - step / 2, atol=1e-12)
+    np.testing.assert_allclose(leapfrog.times("com_acceleration"), time - step, atol=1e-12)
+
+
+def test_what_acts_acts_for_an_interval_within_the_motion(trajectory, leapfrog, staggered):
+    time, step = trajectory.time, DURATION / KNOTS
+    for motion in (trajectory, staggered):
+        begins, ends = acting_times(motion)
+        np.testing.assert_allclose(begins[1:], time[:-1], atol=1e-12)
+        np.testing.assert_allclose(ends, time, atol=1e-12)
+        assert begins[0] == ends[0]
+    begins, ends = acting_times(leapfrog)
+    np.testing.assert_allclose(begins, np.maximum(time - step / 2, 0.0), atol=1e-12)
+    np.testing.assert_allclose(ends, np.minimum(time + step / 2, DURATION), atol=1e-12)
+    np.testing.assert_allclose(begins[1:], ends[:-1], atol=1e-12)
+
+
+def test_the_forces_of_a_motion_carry_its_weight_while_they_act(ironcub, trajectory, leapfrog):
+    """The impulse of the contact forces is that of the weight which the robot stands with, on any grid."""
+    grid = np.array([0.0, 0.1, 0.15, 0.4, 0.5])
+    arrays = {name: getattr(leapfrog, name)[:, : grid.size] for name in QUANTITIES}
+    arrays["contact_forces"] = np.tile([[0.0], [0.0], [ironcub.weight / 8]], (8, grid.size))
+    begins, ends = acting_times(replace(leapfrog, time=grid, **arrays))
+    impulse = (arrays["contact_forces"][2::3].sum(axis=0) * (ends - begins)).sum()
+    assert impulse == pytest.approx(ironcub.weight * grid[-1])
+
+
+def test_a_flight_by_leapfrog_begins_half_an_interval_before_its_first_knot_without_force(ironcub, leapfrog):
+    half = 0.5 * DURATION / KNOTS
+    assert flight_phases(ironcub, leapfrog) == [pytest.approx((LIFT_OFF - half, DURATION))]
+    forces = leapfrog.contact_forces.copy()
+    forces[2, -1] = 100.0
+    landed = replace(leapfrog, contact_forces=forces)
+    assert flight_phases(ironcub, landed) == [pytest.approx((LIFT_OFF - half, DURATION - half))]
+    nothing = replace(leapfrog, contact_forces=np.zeros_like(forces))
+    assert flight_phases(ironcub, nothing) == [(0.0, DURATION)]
+
+
+def test_a_step_by_leapfrog_lasts_from_where_one_force_ends_to_where_the_next_begins(ironcub, trajectory):
+    walk = replace(walking(ironcub, trajectory, lift=0.02, length=0.4), rule=rules.LEAPFROG)
+    for step in footsteps(ironcub, walk, FlatGround()):
+        assert (step.lift_off, step.touch_down) == pytest.approx((0.75, 1.25))
+
+
+def test_a_force_by_leapfrog_counts_with_the_heights_and_slips_on_both_sides_of_its_knot(ironcub, leapfrog):
+    """One foot moves at one knot: the forces of that knot and of both beside it see its height and its way."""
+    knot, up, along = 6, 0.01, 0.03
+    position, forces = leapfrog.base_position.copy(), np.zeros_like(leapfrog.contact_forces)
+    position[:] = ironcub.home.base_position[:, None]
+    position[2, knot] += up
+    position[0, knot] += along
+    forces[2] = 40.0
+    standing = np.repeat(ironcub.home.base_quaternion_xyzw[:, None], KNOTS + 1, axis=1)
+    joints = np.repeat(ironcub.home.joint_positions[:, None], KNOTS + 1, axis=1)
+    hop = replace(
+        leapfrog,
+        base_position=position,
+        base_quaternion_xyzw=standing,
+        joint_positions=joints,
+        contact_forces=forces,
+    )
+    heights, slips = (products[0] for products in contact_products(ironcub, hop, FlatGround()))
+    raised, still = heights[[knot - 1, knot, knot + 1]], np.delete(heights, [knot - 1, knot, knot + 1])
+    assert raised - still[0] == pytest.approx(40.0 * up)
+    np.testing.assert_allclose(still, still[0], atol=1e-9)
+    assert slips[[knot - 1, knot, knot + 1]] == pytest.approx(40.0 * along)
+    np.testing.assert_allclose(np.delete(slips, [knot - 1, knot, knot + 1]), 0.0, atol=1e-9)
 
 
 def test_each_quantity_of_a_staggered_motion_has_its_own_times(trajectory, staggered):
@@ -194,7 +274,7 @@ def test_joint_torques_give_the_power_that_moves_the_joints(ironcub, trajectory)
     middle = time - step / 2
     still["joint_positions"] = home.joint_positions[:, None] + rate * time + 0.5 * acceleration * time**2
     still["joint_velocities"] = rate + acceleration * middle
-    motion = replace(trajectory, time=time, rule=rules.STAGGERED, **still)
+    motion = replace(trajectory, time=time, rule=rules.LEAPFROG, **still)
     mass = free.kindyn.mass_matrix_fun()
     energy = []
     for knot in range(count):
@@ -205,7 +285,34 @@ def test_joint_torques_give_the_power_that_moves_the_joints(ironcub, trajectory)
     np.testing.assert_array_equal(joint_torques(free, motion), generalised_forces(free, motion)[6:])
 
 
-@pytest.mark.parametrize(("rule", "knot"), [(rules.BACKWARD_EULER, 0), (rules.STAGGERED, KNOTS)])
+def test_velocity_products_at_a_knot_are_the_mean_of_those_before_and_after_it(ironcub, trajectory):
+    """Each of two velocities holds for half of the time; with the mean velocity alone the base would lack a wrench."""
+    rng = np.random.default_rng(8)
+    n, step, knot = len(ironcub.joint_names), DURATION / KNOTS, 7
+    velocities = rng.normal(size=(6 + n, KNOTS + 1))
+    motion = replace(
+        trajectory,
+        rule=rules.LEAPFROG,
+        base_linear_velocity=velocities[:3],
+        base_angular_velocity=velocities[3:6],
+        joint_velocities=velocities[6:],
+        contact_forces=np.zeros_like(trajectory.contact_forces),
+        thrust=np.zeros_like(trajectory.thrust),
+    )
+    pose, joints = base_poses(motion)[knot], motion.joint_positions[:, knot]
+    kindyn = ironcub.kindyn
+    before, after = velocities[:, knot], velocities[:, knot + 1]
+    bias = [np.array(kindyn.bias_force(pose, joints, one[:6], one[6:])).ravel() for one in (before, after)]
+    mass = np.array(kindyn.mass_matrix(pose, joints))
+    expected = mass @ (after - before) / step + 0.5 * (bias[0] + bias[1])
+    asked = generalised_forces(ironcub, motion)[:, knot]
+    np.testing.assert_allclose(asked, expected, atol=1e-8)
+    middle = 0.5 * (before + after)
+    alone = mass @ (after - before) / step + np.array(kindyn.bias_force(pose, joints, middle[:6], middle[6:])).ravel()
+    assert np.abs(asked - alone)[:6].max() > 1.0
+
+
+@pytest.mark.parametrize(("rule", "knot"), [(rules.BACKWARD_EULER, 0), (rules.LEAPFROG, KNOTS)])
 def test_the_torques_of_the_knot_without_an_acceleration_do_not_count(ironcub, trajectory, rule, knot):
     forces = trajectory.contact_forces.copy()
     forces[2, knot] += 1e4

@@ -3,7 +3,7 @@
 from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.auditing.findings import Finding
 from multimodal_to.auditing.properties import PROPERTIES, check_allowances
-from multimodal_to.auditing.property import Judged, Property
+from multimodal_to.auditing.property import Judged, Of, Property
 from multimodal_to.auditing.self_collision import Clearance, link_clearances
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "Clearance",
     "Finding",
     "Judged",
+    "Of",
     "Property",
     "audit",
     "check_allowances",

@@ -14,6 +14,7 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Finding, Motion, Worst, largest, worst_of
 from multimodal_to.auditing.integrator import integrator_findings
+from multimodal_to.auditing.margins import margin_findings
 from multimodal_to.auditing.properties import GAPS, PROPERTIES, check_allowances
 from multimodal_to.auditing.self_collision import link_findings
 from multimodal_to.auditing.task import task_findings
@@ -31,6 +32,7 @@ from multimodal_to.trajectory.derived import (
     base_poses,
     flight_phases,
     generalised_forces,
+    greatest_while_acting,
     loaded_force,
     surface_frames,
 )
@@ -92,6 +94,7 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         *thrust_findings(robot, trajectory),
         *integrator_findings(motion),
         *link_findings(robot, trajectory),
+        *margin_findings(motion, scenario),
         *(task_findings(motion, scenario) if scenario else ()),
     )
     findings = _findings(worst, motion, scenario)
@@ -111,7 +114,7 @@ def _findings(worst: Sequence[Worst], motion: Motion, scenario: Scenario | None)
     Args:
         worst: one for each property, in order.
         motion: whose robot and integration rule a limit may depend on.
-        scenario: whose allowances may widen a limit.
+        scenario: whose margins set a limit, and whose allowances may widen one.
 
     Raises:
         InputError: the scenario allows more of a property that is not judged.
@@ -204,7 +207,8 @@ def _dynamics(motion: Motion) -> list[Worst]:
 def _followed(values: Array, trajectory: Trajectory) -> Array:
     """Return the values at knots at which an acceleration is known, along the last axis.
 
-    Under a staggered rule no interval follows the last knot. Whether a motion rests there is what its task asks.
+    Where velocities are in the middles of intervals, none follows the last knot. Whether a motion rests there is what
+    its task asks.
     """
     return values[..., :-1] if rules.instant(trajectory.rule, "com_velocity") else values
 
@@ -225,7 +229,7 @@ def _integration(motion: Motion) -> list[Worst]:
     """Compare what a quantity gains over an interval with the rate that the interval's end holds, times Δt."""
     trajectory, steps = motion.trajectory, np.diff(motion.trajectory.time)
     findings = []
-    for name, rate, _, _ in GAPS:
+    for name, rate, *_ in GAPS:
         gaps = np.diff(getattr(trajectory, name), axis=1) - getattr(trajectory, rate)[:, 1:] * steps
         findings.append(worst_of(f"gap of {name}", largest(gaps), first=1))
     rotations = motion.base[:, :3, :3]
@@ -267,9 +271,9 @@ def _contacts(motion: Motion, scenario: Scenario | None) -> list[Worst]:
     moves = np.diff(points, axis=1, prepend=points[:, :1])
     slips = np.linalg.norm(np.einsum("ckxt,ckx->ckt", tangents, moves), axis=2)
     names = motion.robot.contact_names
-    raised = heights
-    if rules.instant(motion.trajectory.rule, "contact_forces"):  # a force of an interval acts at both of its ends
-        raised = np.maximum(heights, np.hstack([heights[:, :1], heights[:, :-1]]))
+    rule = motion.trajectory.rule
+    raised = greatest_while_acting(heights, rule)
+    slips = greatest_while_acting(slips, rule, of_intervals=True)
     return [
         worst_of("penetration", -heights, names),
         worst_of("pulling normal force", -normal, names),

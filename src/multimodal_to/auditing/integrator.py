@@ -4,9 +4,10 @@ The robot is a floating base whose joints follow the file. Its state is y = (x, 
 
 m ẍ = m g + Σ f_i + Σ f_j,  ḣω = Σ (p_i − x) × f_i + Σ r_j × f_j,  ω = R I⁻¹ (Rᵀ hω − A ṡ),  T̈ by the turbine's model.
 
-Contact forces f_i and throttles are constant over an interval, and are those that its end holds. Each f_i acts in the
-world where the file has its point p_i. Thrusts f_j turn with the base: r_j and their directions are those of the frames
-on the base that is integrated. I and A are the angular part of J_CMM in base axes, at the file's joints. Between the
+Contact forces f_i and throttles are constant over an interval, and are those that its end holds. Under leapfrog they
+are constant from half an interval before their knot to half an interval after it. Each f_i acts in the world where the
+file has its point p_i. Thrusts f_j turn with the base: r_j and their directions are those of the frames on the base
+that is integrated. I and A are the angular part of J_CMM in base axes, at the file's joints. Between the
 knots joints and points follow a cubic spline, whose error is small beside that of any rule here.
 
 No motion like this is stable without a controller. So the state starts again from the file at every knot, and runs for
@@ -94,10 +95,12 @@ class Controls:
 
         Args:
             motion: that holds them.
-            steps: of the integrator, an interval; by default what `_LARGEST_STEP` asks for.
+            steps: of the integrator, an interval; by default what `_LARGEST_STEP` asks for. One more where the
+                controls change in the middle of an interval and the number is odd.
         """
         robot, trajectory, kindyn = motion.robot, motion.trajectory, motion.robot.kindyn
         steps = steps or max(1, int(np.ceil(np.diff(trajectory.time).max() / _LARGEST_STEP - 1e-9)))
+        steps += steps % 2 if rules.acts_after(trajectory.rule) else 0
         instants = _instants(trajectory.time, 2 * steps)
         count, jets = instants.size, len(robot.jets)
         joints, velocities = spline(trajectory.time, trajectory.joint_positions.T, instants)
@@ -125,8 +128,8 @@ class Controls:
     def starts(self) -> Array:
         """Return the file's states at the knots, (knots + 1, 13 + 2 jets).
 
-        Where the file has a velocity in the middle of an interval, that of the knot is v + ½ Δt a under what acts over
-        the interval before it.
+        Where the file has a velocity in the middle of an interval, that of the knot is v + ½ Δt a under what acts from
+        there to the knot.
         """
         plan, jets = self.trajectory, len(self.robot.jets)
         names = ("com_position", "com_velocity", "angular_momentum", "base_quaternion_xyzw", "thrust", "thrust_rate")
@@ -140,6 +143,12 @@ class Controls:
         shares[_V] = shares[_H] = rules.instant(plan.rule, "com_velocity")
         shares[_THRUSTS + jets :] = rules.instant(plan.rule, "thrust_rate")
         return np.asarray(states + np.where(shares, shares * durations[:, None] * slopes, 0.0))
+
+    @cached_property
+    def columns(self) -> Indices:
+        """Return which column acts in each step of an interval, from that of the interval's start on, (steps,)."""
+        shares = (np.arange(self.steps) + 0.5) / self.steps
+        return np.asarray(shares > rules.acts_after(self.trajectory.rule), dtype=np.intp)
 
     def slope(self, states: Array, instants: Indices, columns: Indices) -> Array:
         """Return ẏ of many states at once, (states, 13 + 2 jets).
@@ -177,11 +186,10 @@ class Controls:
             states: at the starts of the intervals, (states, 13 + 2 jets).
             intervals: which interval each goes through, (states,).
         """
-        columns = intervals + 1
         step = (np.diff(self.trajectory.time)[intervals] / self.steps)[:, None]
         with np.errstate(all="ignore"):
             for index in range(self.steps):
-                first = 2 * (intervals * self.steps + index)
+                first, columns = 2 * (intervals * self.steps + index), intervals + self.columns[index]
                 k1 = self.slope(states, first, columns)
                 k2 = self.slope(states + 0.5 * step * k1, first + 1, columns)
                 k3 = self.slope(states + 0.5 * step * k2, first + 1, columns)
@@ -212,11 +220,11 @@ class Controls:
         thrust, _ = spline(plan.time, plan.thrust.T, instants)
         quaternions, _ = spline(plan.time, _continuous(plan.base_quaternion_xyzw.T), instants)
         thrusts = np.einsum("kij,kcj,kc->ki", rotations(quaternions), self.directions, thrust)
-        contacts = plan.contact_forces.reshape(len(robot.contacts), 3, -1).sum(axis=0).T[1:]
+        columns = (np.arange(plan.knots)[:, None] + self.columns).ravel()
+        contacts = plan.contact_forces.reshape(len(robot.contacts), 3, -1).sum(axis=0).T[columns]
         step = (np.repeat(np.diff(plan.time), self.steps) / self.steps)[:, None]
         starts, middles, ends = (
-            robot.gravity + (np.repeat(contacts, self.steps, axis=0) + part) / robot.mass
-            for part in (thrusts[:-2:2], thrusts[1::2], thrusts[2::2])
+            robot.gravity + (contacts + part) / robot.mass for part in (thrusts[:-2:2], thrusts[1::2], thrusts[2::2])
         )
         velocity = np.vstack([self.starts[:1, _V], step / 6.0 * (starts + 4.0 * middles + ends)]).cumsum(axis=0)
         gains = step * velocity[:-1] + step**2 / 6.0 * (starts + 2.0 * middles)

@@ -3,7 +3,8 @@
 The findings take unit and limit from this table, and the reference page of the audit is made from it.
 
 Many limits follow from the solver. It counts a motion as feasible when no row is missed by more than 1e-5 of the row's
-scale (`solving.best.FEASIBLE`). That is 1e-5 m, rad, m/s or kg m²/s, and 5e-4 N or N/s for rows with a scale of 50.
+scale (`solving.solver.FEASIBLE`). That is 1e-5 m, rad, m/s or kg m²/s, and 5e-4 N or N/s for rows with a scale of 50:
+for every robot, so that these limits are in the property's unit. The others are shares of the robot's size (`Of`).
 """
 
 from __future__ import annotations
@@ -11,14 +12,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from multimodal_to.auditing.property import Judged, Property
+from multimodal_to.auditing.margins import MARGINS
+from multimodal_to.auditing.property import Judged, Of, Property
 from multimodal_to.auditing.self_collision import SELF_COLLISION
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory.derived import LOADED_SHARE
 
-_FEASIBLE = "what a feasible motion may miss its row by"
+_FEASIBLE = "what a feasible motion may miss its row by, the same for every robot"
+_TWICE_FEASIBLE = "twice what a feasible motion may miss its row by, the same for every robot"
 _BOUND = "a bound, which the solver holds; the limit is for rounding"
 
 _PHYSICS = (
@@ -33,7 +36,8 @@ _PHYSICS = (
         name="momentum consistency",
         unit="kg m²/s",
         limit=1e-4,
-        reason="ten times what a feasible motion may miss its row by, since the CoM's own miss enters too",
+        reason="ten times what a feasible motion may miss its row by, the same for every robot, since the CoM's own "
+        "miss enters too",
         meaning="difference of the stored angular momentum hω from J_CMM(q) ν",
     ),
     Property(
@@ -53,52 +57,57 @@ _PHYSICS = (
     Property(
         name="force balance",
         unit="N",
-        limit=1e-2,
-        reason="a feasible motion may miss its row by 1e-5 m/s, which over 0.05 s is 9e-3 N for a robot of 45 kg",
+        limit=2.3e-5,
+        of=Of.WEIGHT,
+        reason="a feasible motion may miss its row by 1e-5 m/s, which over 0.05 s is 2e-5 of the weight",
         meaning="m g + Σ f − m ẍ, largest component: Newton for the whole robot",
     ),
     Property(
         name="moment balance",
         unit="N m",
-        limit=1e-2,
-        reason="chosen: the number of the force balance, for an arm of 1 m",
+        limit=4e-5,
+        of=Of.MOMENT,
+        reason="chosen: twice the share of the force balance",
         meaning="Σ (p − x) × f − ḣω, largest component: Euler for the whole robot",
     ),
     Property(
         name="torque beyond effort",
         unit="N m",
-        limit=1e-3,
+        limit=4e-6,
+        of=Of.MOMENT,
         reason="the effort limit of `robot.toml`, or the URDF's; the rest is for rounding",
-        meaning="torque of a joint by inverse dynamics (RNEA) minus its effort limit; the problem has no row for it",
+        meaning="torque of a joint by inverse dynamics (RNEA) minus its effort limit, of every joint that has one; "
+        "the term `joint_torques` holds torques below a share of it, the scenario's `margins.torque`",
     ),
     Property(
         name="unexplained base force",
         unit="N",
         limit=0.01,
-        of_weight=True,
+        of=Of.WEIGHT,
         reason="chosen: one hundredth of the robot's weight",
         meaning="force that RNEA asks for at the base, where nothing pushes",
     ),
     Property(
         name="unexplained base moment",
         unit="N m",
-        limit=1.0,
-        reason="chosen: small beside the torque of one leg joint",
+        limit=0.004,
+        of=Of.MOMENT,
+        reason="chosen: for the iRonCub 1 N m, small beside the torque of one leg joint",
         meaning="moment that RNEA asks for at the base, where nothing pushes",
     ),
 )
 
 GAPS = (
-    ("com_position", "com_velocity", "m", 1e-5),
-    ("com_velocity", "com_acceleration", "m/s", 1e-5),
-    ("angular_momentum", "angular_momentum_rate", "kg m²/s", 1e-5),
-    ("base_position", "base_linear_velocity", "m", 1e-5),
-    ("joint_positions", "joint_velocities", "rad", 1e-5),
-    ("contact_forces", "contact_force_rates", "N", 1e-3),
-    ("thrust", "thrust_rate", "N", 1e-3),
-    ("thrust_rate", "thrust_acceleration", "N/s", 1e-3),
+    ("com_position", "com_velocity", "m", 1e-5, Of.UNIT),
+    ("com_velocity", "com_acceleration", "m/s", 1e-5, Of.UNIT),
+    ("angular_momentum", "angular_momentum_rate", "kg m²/s", 1e-5, Of.UNIT),
+    ("base_position", "base_linear_velocity", "m", 1e-5, Of.UNIT),
+    ("joint_positions", "joint_velocities", "rad", 1e-5, Of.UNIT),
+    ("contact_forces", "contact_force_rates", "N", 2.3e-6, Of.WEIGHT),
+    ("thrust", "thrust_rate", "N", 1e-3, Of.UNIT),
+    ("thrust_rate", "thrust_acceleration", "N/s", 1e-3, Of.UNIT),
 )
-"""The quantities that backward Euler integrates: name, its rate, unit and limit of what is left."""
+"""The quantities that a rule integrates: name, its rate, unit and limit of what is left, and the limit's `Of`."""
 _DIFFERENCES = ("com_acceleration", "angular_momentum_rate", "contact_force_rates", "thrust_acceleration")
 """Rates that are no variables of the problem: the library's own files hold the difference itself."""
 
@@ -106,7 +115,7 @@ _DIFFERENCES = ("com_acceleration", "angular_momentum_rate", "contact_force_rate
 def _gap_reason(rate: str, limit: float) -> str:
     if rate in _DIFFERENCES:
         return "this library's files hold the difference itself as the rate; the limit is for files from elsewhere"
-    return _FEASIBLE if limit == 1e-5 else "twice what a feasible motion may miss its row by"
+    return _FEASIBLE if limit == 1e-5 else _TWICE_FEASIBLE
 
 
 _INTEGRATION = (
@@ -115,10 +124,11 @@ _INTEGRATION = (
             name=f"gap of {name}",
             unit=unit,
             limit=limit,
+            of=of,
             reason=_gap_reason(rate, limit),
             meaning=f"gain of `{name}` over an interval minus `{rate}` at its end × Δt",
         )
-        for name, rate, unit, limit in GAPS
+        for name, rate, unit, limit, of in GAPS
     ),
     Property(
         name="gap of base orientation",
@@ -148,7 +158,7 @@ _ACTUATION_AND_CONTACT = (
         name="pulling normal force",
         unit="N",
         limit=1e-3,
-        reason="twice what a feasible motion may miss its row by",
+        reason=_TWICE_FEASIBLE,
         meaning="contact force towards the ground's inside, −n·f",
     ),
     Property(
@@ -156,23 +166,28 @@ _ACTUATION_AND_CONTACT = (
         unit="N",
         limit=1e-3,
         second_order_limit=1e-2,
-        reason="twice what a feasible motion may miss its row by; under the second-order cone more, because a row of "
-        "squares is met less sharply where forces vanish",
+        reason=f"{_TWICE_FEASIBLE}; under the second-order cone more, because a row of squares is met less sharply "
+        "where forces vanish",
         meaning="|t·f| − μ n·f under the scenario's cone and friction",
     ),
     Property(
         name="normal force × height",
         unit="N m",
-        limit=0.01,
-        reason="twice the default of `complementarity_max`",
-        meaning="normal force of a contact point × its height: force in the air",
+        limit=4e-5,
+        of=Of.MOMENT,
+        reason="for the iRonCub twice the default of `complementarity_max`",
+        meaning="normal force of a contact point × its height, under leapfrog the greatest height of its knot and the "
+        "two beside it, within which the force acts: force in the air",
     ),
     Property(
         name="slip under load",
         unit="m",
-        limit=1e-3,
-        reason="above what the default of `sliding_max` lets a point with 5 N slip: 0.4 mm along each tangent",
-        meaning="way of a contact point along the ground over an interval at whose end it carries load: "
+        limit=1.75e-3,
+        of=Of.HEIGHT,
+        reason="for the iRonCub 1 mm, above what the default of `sliding_max` lets a point with 5 N slip: 0.4 mm along "
+        "each tangent",
+        meaning="way of a contact point along the ground over an interval at whose end it carries load, under leapfrog "
+        "at either end: "
         f"more than {100 * LOADED_SHARE:g} % of the weight over the number of points (iRonCub: 5 N)",
     ),
     Property(
@@ -206,16 +221,22 @@ _ACTUATION_AND_CONTACT = (
     Property(
         name="thrust off CVODES, interval",
         unit="N",
-        limit=10.0,
-        reason="chosen: a sixteenth of the smaller turbine's 160 N",
+        limit=1 / 32,
+        first_order_limit=1 / 16,
+        of=Of.THRUST,
+        reason="chosen, twice what plans by a rule of order two with steps of 0.2 s are off where throttles jump; for "
+        "the iRonCub 5 N, by a rule of order one 10 N",
         meaning="thrust at an interval's end minus that of an adaptive integrator started at the interval's start",
         judged=Judged.WITH_JETS,
     ),
     Property(
         name="thrust off CVODES, horizon",
         unit="N",
-        limit=20.0,
-        reason="chosen: twice the limit of one interval",
+        limit=1 / 32,
+        first_order_limit=1 / 8,
+        of=Of.THRUST,
+        reason="chosen: the limit of one interval, since errors of a rule of order two do not add up; by one of order "
+        "one twice as much",
         meaning="thrust at a knot minus that of an adaptive integrator started at the first knot",
         judged=Judged.WITH_JETS,
     ),
@@ -232,7 +253,7 @@ _ORDER = (
         unit="m",
         limit=0.05,
         first_order_limit=0.2,
-        of_height=True,
+        of=Of.HEIGHT,
         reason=f"{_SECOND_ORDER}; one of order one is off by half an interval of each change of a force",
         meaning=f"distance of the CoM at a knot from that of {_BY_CONTROLS}",
     ),
@@ -249,7 +270,7 @@ _ORDER = (
         unit="m",
         limit=0.25,
         first_order_limit=10.0,
-        of_height=True,
+        of=Of.HEIGHT,
         reason=f"{_SECOND_ORDER}; backward Euler has contact forces half an interval before thrusts, which leaves a "
         "speed of ½ g Δt after a take-off: metres in ten seconds",
         meaning="distance of the CoM at a knot from that of an accurate integrator that started at the first knot, "
@@ -308,7 +329,7 @@ def _hovering(when: str, condition: Judged) -> tuple[Property, ...]:
             name=f"{when}: contact force",
             unit="N",
             limit=0.011,
-            reason="the problem leaves 0.01 N; a tenth of that for rounding",
+            reason="the problem leaves 0.01 N, the same for every robot; a tenth of that for rounding",
             meaning="largest component of a contact force",
             judged=condition,
         ),
@@ -324,7 +345,7 @@ def _hovering(when: str, condition: Judged) -> tuple[Property, ...]:
             name=f"{when}: thrust off weight",
             unit="N",
             limit=0.1,
-            reason="eight contact points may still carry 0.01 N each; the rest is for rounding",
+            reason="the problem leaves 0.01 N at each contact point, the same for every robot; enough for ten",
             meaning="sum of the thrusts plus m g, largest component",
             judged=condition,
         ),
@@ -344,7 +365,8 @@ def _equilibrium(when: str, condition: Judged) -> tuple[Property, ...]:
         Property(
             name=f"{when}: force balance",
             unit="N",
-            limit=1e-2,
+            limit=2.3e-5,
+            of=Of.WEIGHT,
             reason="the limit of the force balance",
             meaning="Σ f + m g, largest component, whatever accelerations the file states",
             judged=condition,
@@ -352,7 +374,8 @@ def _equilibrium(when: str, condition: Judged) -> tuple[Property, ...]:
         Property(
             name=f"{when}: moment balance",
             unit="N m",
-            limit=1e-2,
+            limit=4e-5,
+            of=Of.MOMENT,
             reason="the limit of the moment balance",
             meaning="Σ (p − x) × f, largest component, whatever rates the file states",
             judged=condition,
@@ -424,7 +447,7 @@ _TASK = (
 PROPERTIES: Mapping[str, Property] = MappingProxyType(
     {
         entry.name: entry
-        for entry in (*_PHYSICS, *_INTEGRATION, *_ACTUATION_AND_CONTACT, *_ORDER, *SELF_COLLISION, *_TASK)
+        for entry in (*_PHYSICS, *_INTEGRATION, *_ACTUATION_AND_CONTACT, *_ORDER, *SELF_COLLISION, *MARGINS, *_TASK)
     }
 )
 """Every property by name, in the order of an audit's findings."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
-from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
+from multimodal_to.models.sole import soles
+from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal
 from multimodal_to.trajectory import rules
 
 
@@ -17,7 +19,10 @@ class Judged(Enum):
     ALWAYS = "always"
     WITH_JETS = "the motion has jets"
     WITH_CAPSULES = "the robot has capsules"
+    WITH_SOLES = "the robot has soles"
     WITH_SCENARIO = "the scenario is known"
+    WITH_MARGINS = "the scenario asks for margins"
+    WITH_TOUCH_DOWN = "the scenario asks for a `touch_down_speed`"
     WITH_MID_HEIGHT = "the scenario has a `mid_height_min`"
     STANDING_START = "the scenario starts standing"
     HOVERING_START = "the scenario starts in a hover"
@@ -31,11 +36,14 @@ class Judged(Enum):
             Judged.ALWAYS: True,
             Judged.WITH_JETS: bool(robot.jets),
             Judged.WITH_CAPSULES: bool(robot.capsules),
+            Judged.WITH_SOLES: bool(soles(robot)),
         }
         if self in physics or scenario is None:
             return physics.get(self, False)
         return {
             Judged.WITH_SCENARIO: True,
+            Judged.WITH_MARGINS: scenario.margins != Margins.none(),
+            Judged.WITH_TOUCH_DOWN: scenario.margins.touch_down_speed > 0.0,
             Judged.WITH_MID_HEIGHT: scenario.mid_height_min is not None,
             Judged.STANDING_START: scenario.start is Start.STANDING,
             Judged.HOVERING_START: scenario.start is Start.HOVER,
@@ -45,27 +53,56 @@ class Judged(Enum):
         }[self]
 
 
+class Of(Enum):
+    """What a limit is a share of, so that it is as strict for a small robot as for a large one; the value names it."""
+
+    UNIT = ""
+    """Nothing: the limit is in the property's unit."""
+    WEIGHT = "m g"
+    """The robot's weight [N]."""
+    HEIGHT = "L"
+    """Its standing height [m]."""
+    MOMENT = "m g L"
+    """Its weight at an arm of its standing height [N m]."""
+    SPEED = "√(g L)"
+    """Its unit of speed [m/s]."""
+    THRUST = "of the least `thrust_max`"
+    """The greatest thrust of its smallest jet [N]; without jets it is infinite."""
+
+    def size(self, robot: Robot) -> float:
+        """Return how much it is for a robot."""
+        return {
+            Of.UNIT: 1.0,
+            Of.WEIGHT: robot.weight,
+            Of.HEIGHT: robot.standing_height,
+            Of.MOMENT: robot.weight * robot.standing_height,
+            Of.SPEED: robot.speed_unit,
+            Of.THRUST: min((jet.thrust_max for jet in robot.jets), default=math.inf),
+        }[self]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Property:
     """One thing that an audit judges."""
 
     name: str
     unit: str
-    limit: float  # largest value that holds, in `unit`; a share of m |g| where `of_weight`, of L where `of_height`
+    limit: float  # largest value that holds, as a share of `of`
     reason: str  # where the limit comes from
     meaning: str  # what is compared with the limit
     judged: Judged = Judged.ALWAYS
-    of_weight: bool = False
-    of_height: bool = False
+    of: Of = Of.UNIT
+    margin: str | None = None  # of the scenario's `Margins`: the limit is that much more
+    unasked: float = 0.0  # what stands for the margin where the scenario is not known or asks for none
     second_order_limit: float | None = None  # the limit under the second-order friction cone, where it is another one
     first_order_limit: float | None = None  # the limit by an integration rule of order one, where it is another one
 
-    def limit_for(self, robot: Robot, scenario: Scenario | None, rule: str = rules.STAGGERED) -> float:
+    def limit_for(self, robot: Robot, scenario: Scenario | None, rule: str = rules.LEAPFROG) -> float:
         """Return the limit in `unit`.
 
         Args:
-            robot: whose weight or standing height the limit may be a share of.
-            scenario: which says the friction cone, where it is known.
+            robot: whose size the limit may be a share of.
+            scenario: which says the friction cone and the margins, where it is known.
             rule: name of the motion's integration rule; every one with all at its knots is of order one.
         """
         limit = self.limit
@@ -73,4 +110,7 @@ class Property:
             limit = self.first_order_limit
         if self.second_order_limit is not None and scenario and scenario.friction_cone is FrictionCone.SECOND_ORDER:
             limit = self.second_order_limit
-        return limit * (robot.weight if self.of_weight else robot.standing_height if self.of_height else 1.0)
+        if self.margin is not None:
+            asked: float = getattr(scenario.margins, self.margin) if scenario else 0.0
+            limit += asked or self.unasked
+        return limit * self.of.size(robot)

@@ -1,4 +1,4 @@
-"""Thrusts integrated again by an adaptive method, from the file's throttles: how far backward Euler is off."""
+"""Thrusts integrated again by an adaptive method, from the file's throttles: how far the integration rule is off."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ _TOLERANCE = 1e-8  # of the integrator, relative and absolute
 def thrust_findings(robot: Robot, trajectory: Trajectory) -> list[Worst]:
     """Compare the thrusts with those that T̈ = f + g gives for the same throttles, integrated by CVODES.
 
-    The throttle of an interval is that which its end holds. Once every interval starts from the file's T and Ṫ, and
-    once the horizon runs through from the first knot. Where the file has Ṫ in the middles of intervals, that of a knot
-    is Ṫ + ½ Δt T̈ under the throttle of the interval before.
+    The throttle of an interval is that which its end holds. Under leapfrog a throttle acts from half an interval before
+    its knot to half an interval after it: there the interval has the throttle of its start in its first half, and that
+    of its end in its second half. Once every interval starts from the file's T and Ṫ, and once the horizon runs through
+    from the first knot. Where the file has Ṫ in the middles of intervals, that of a knot is Ṫ_k = Ṫ_k−½ + ½ Δt T̈_k.
     """
     count = len(robot.jets)
     if not count:
@@ -26,10 +27,13 @@ def thrust_findings(robot: Robot, trajectory: Trajectory) -> list[Worst]:
     step, steps = _integrator(robot), np.diff(trajectory.time)
     states, throttles = np.vstack([trajectory.thrust, _rates(robot, trajectory)]), trajectory.throttle
     alone, through = np.zeros((count, steps.size)), np.zeros((count, steps.size))
-    state: Array = states[:, 0]
+    state, after = states[:, 0], rules.acts_after(trajectory.rule)
     for index, dt in enumerate(steps):
-        parameters = np.append(throttles[:, index + 1], dt)
-        state, end = _advance(step, state, parameters), _advance(step, states[:, index], parameters)
+        end = states[:, index]
+        for column, share in ((index, after), (index + 1, 1.0 - after)):
+            if share:
+                parameters = np.append(throttles[:, column], share * dt)
+                state, end = _advance(step, state, parameters), _advance(step, end, parameters)
         alone[:, index] = end[:count] - trajectory.thrust[:, index + 1]
         through[:, index] = state[:count] - trajectory.thrust[:, index + 1]
     names = robot.jet_names
@@ -41,12 +45,12 @@ def thrust_findings(robot: Robot, trajectory: Trajectory) -> list[Worst]:
 
 def _rates(robot: Robot, trajectory: Trajectory) -> Array:
     """Return Ṫ of each jet at the knots [N/s], (jets, knots + 1)."""
-    rates, steps = trajectory.thrust_rate, np.diff(trajectory.time, prepend=trajectory.time[0])
+    rates, time = trajectory.thrust_rate, trajectory.time
     accelerations = [
         jet.model.acceleration(trajectory.thrust[row], rates[row], trajectory.throttle[row])
         for row, jet in enumerate(robot.jets)
     ]
-    return np.asarray(rates + rules.instant(trajectory.rule, "thrust_rate") * steps * np.array(accelerations))
+    return np.asarray(rates + (time - trajectory.times("thrust_rate")) * np.array(accelerations))
 
 
 def _advance(step: cs.Function, state: Array, parameters: Array) -> Array:

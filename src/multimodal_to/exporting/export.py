@@ -20,14 +20,14 @@ from multimodal_to.trajectory.derived import JOINT_TORQUES, base_poses, joint_to
 _NAMES = ("joint_names", "contact_names", "jet_names")
 _RATES = (
     "Rates at knot k are those of the interval that ends at k where backward Euler was the rule, and none at knot 0; "
-    "where the rule was staggered, all quantities are at the knots."
+    "where the rule was leapfrog, all quantities are at the knots."
 )
 CONVENTIONS = (
     "Time in s. All vectors are in world axes, z up. Quaternions are world-from-base, x y z w.",
     _RATES,
     "Contact forces act on the robot at its contact points; thrusts act along -z of the jets' frames.",
     "Joint torques follow from the motion by inverse dynamics, at the knots. They have no meaning at the knot whose "
-    "acceleration the motion does not tell: the first of backward Euler, the last of a staggered rule.",
+    "acceleration the motion does not tell: the first of backward Euler, the last of leapfrog.",
 )
 
 

@@ -32,6 +32,10 @@ class FrictionCone(Enum):
     """‖t·f‖ ≤ μ n·f: Coulomb's round cone."""
 
 
+DESCENT_RATE = 1.2
+"""κ: how much faster a point may come down the higher it is above where it touches the ground [√(g / L)]."""
+
+
 def normal_force(surface: Surface, point: SX, force: SX) -> SX:
     """Return n(p)ᵀ f [N].
 

@@ -10,6 +10,8 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 
+PRESSURE_SLACK = 0.002
+"""Moment about an edge of a sole that a plan may lack, so that a foot without load is inside the set [m g L]."""
 _FLAT = 1e-6
 """Points nearer to one line than this share of their spread are no sole [1]."""
 

@@ -17,18 +17,13 @@ from multimodal_to.adam.spatial import SX
 from multimodal_to.models import contact
 from multimodal_to.models.centroidal import thrust_force
 from multimodal_to.models.robot import Robot
-from multimodal_to.models.sole import soles
+from multimodal_to.models.sole import PRESSURE_SLACK, soles
 from multimodal_to.ocp import constraints, costs, paper
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.self_collision import link_distances, link_pair_labels
 from multimodal_to.ocp.terms import Constraint, Where, at_least, between
-
-PRESSURE_SLACK = 0.002
-"""Moment about an edge of the sole that is let go, so that a foot without load is inside the set [m g L]."""
-DESCENT_RATE = 1.2
-"""κ: how much faster a contact point may come down the higher it is [√(g / L)]."""
 
 
 def generalised_forces(interval: Interval) -> SX:
@@ -96,7 +91,8 @@ def centre_of_pressure(knot: Knot, parameters: Parameters) -> SX:
 def touch_down(interval: Interval, parameters: Parameters) -> SX:
     """(Δt (v + κ d⁺) − (d − d⁺)) / L: a point comes down the slower the nearer it is to the ground."""
     robot = parameters.robot
-    speed, rate = parameters.scenario.margins.touch_down_speed * robot.speed_unit, DESCENT_RATE * robot.rate_unit
+    speed = parameters.scenario.margins.touch_down_speed * robot.speed_unit
+    rate = contact.DESCENT_RATE * robot.rate_unit
     rows = []
     for before, after in zip(interval.start.points, interval.end.points, strict=True):
         low = parameters.surface.distance(after)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.plotting.style import (
     COLOURS,
@@ -22,7 +20,7 @@ from multimodal_to.plotting.style import (
     runs_of,
 )
 from multimodal_to.trajectory import Trajectory
-from multimodal_to.trajectory.derived import flight_force
+from multimodal_to.trajectory.derived import acting_times, flight_force, spans
 
 _BAR = 0.8  # of the height that a contact point has in the timeline
 
@@ -30,8 +28,8 @@ _BAR = 0.8  # of the height that a contact point has in the timeline
 def plot_contacts(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Plot a timeline of the contact points by foot, and each foot's vertical force [N] and least height [mm].
 
-    A bar spans the intervals over which a point's vertical force is above `derived.flight_force`: the force at a knot
-    acts over the interval that ends there. Several runs stand below each other in the timeline.
+    A bar spans the time over which a point's forces act that are above `derived.flight_force`: `derived.acting_times`.
+    Several runs stand below each other in the timeline.
 
     Raises:
         InputError: the trajectories are for different robots, or too many.
@@ -65,19 +63,13 @@ def _draw_timeline(axes: Axes, runs: Sequence[Run], feet: Sequence[str]) -> None
     names: list[str] = []
     for run in runs:
         loaded = run.trajectory.per_contact("contact_forces")[:, 2] > flight_force(run.robot)
+        times = acting_times(run.trajectory)
         for contact, row in zip(run.robot.contacts, loaded, strict=True):
             colour = COLOURS[feet.index(contact.foot) % len(COLOURS)]
-            spans = [(start, end - start) for start, end in _spans(run.trajectory.time, row)]
-            axes.broken_barh(spans, (len(names) - _BAR / 2, _BAR), facecolors=colour)
+            bars = [(start, end - start) for start, end in spans(row, *times) if end > start]
+            axes.broken_barh(bars, (len(names) - _BAR / 2, _BAR), facecolors=colour)
             names.append(contact.frame if len(runs) == 1 else f"{contact.frame}, {run.label}")
     axes.set_yticks(range(len(names)), names, fontsize="x-small")
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.set_ylabel("loaded")
     axes.grid(axis="x", alpha=0.3)
-
-
-def _spans(time: Array, loaded: np.ndarray) -> list[tuple[float, float]]:
-    """Return start and end [s] of each run of intervals whose end is loaded."""
-    edges = np.concatenate(([False], loaded[1:], [False]))
-    starts, ends = np.flatnonzero(~edges[:-1] & edges[1:]), np.flatnonzero(edges[:-1] & ~edges[1:])
-    return [(float(time[i]), float(time[j])) for i, j in zip(starts, ends, strict=True)]

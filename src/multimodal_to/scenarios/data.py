@@ -12,7 +12,7 @@ from typing import Any
 from multimodal_to.errors import ScenarioError
 from multimodal_to.files.records import Records
 from multimodal_to.models.terrain import SURFACES, Surface
-from multimodal_to.scenarios.scenario import Scenario, Vector3
+from multimodal_to.scenarios.scenario import Margins, Scenario, Vector3
 from multimodal_to.trajectory import Trajectory
 
 HEIGHTS = {"initial_com_height": "initial_com", "final_com_height": "final_com"}
@@ -75,12 +75,21 @@ def to_json(scenario: Scenario) -> str:
 def stored(trajectory: Trajectory) -> Scenario | None:
     """Return the scenario that a trajectory was solved from, if it keeps one.
 
+    A margin that the file does not state was not asked for: files of before the margins have none.
+
     Raises:
         ScenarioError: what it keeps is no scenario of this release.
     """
     if not trajectory.scenario_json:
         return None
     try:
-        return from_dict(json.loads(trajectory.scenario_json))
+        return from_dict(_with_margins(json.loads(trajectory.scenario_json)))
     except (ValueError, RecursionError, ScenarioError) as error:
         raise ScenarioError(f"the scenario kept with '{trajectory.scenario}' cannot be read: {error}") from error
+
+
+def _with_margins(table: Any) -> Any:
+    """Return the plain data of a stored scenario with a zero for every margin that they lack."""
+    if not isinstance(table, dict) or not isinstance(table.get("margins", {}), dict):
+        return table  # which is refused where it is read
+    return {**table, "margins": {**RECORDS.plain(Margins.none()), **table.get("margins", {})}}

@@ -1,4 +1,4 @@
-"""A plan at every step of a simulation, linear between its knots; after its end it stands still there."""
+"""A plan at every step of a simulation; after its end it stands still there."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory, rules
-from multimodal_to.trajectory.derived import base_poses, joint_torques
+from multimodal_to.trajectory.derived import acting_times, base_poses, joint_torques
 from multimodal_to.trajectory.resampling import resample
 
 
@@ -33,8 +33,10 @@ class Reference:
 def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) -> Reference:
     """Return a plan at times since its start [s].
 
-    Where the plan's rule has contact forces and thrust rates over intervals, they are read in the middles of these, as
-    its velocities are.
+    Under leapfrog contact forces and throttles are constant from half an interval before their knot to half an interval
+    after it, as the plan means them. Torques are linear between knots: those that jump shake the joints, and in a jump
+    they ask a sixth more of the motors. Where contact forces and thrust rates belong to intervals, they are read in the
+    middles of these, as velocities are, and linear between them.
 
     Backward Euler holds the velocity of knot k over the interval that ends there, so velocities are read half an
     interval later than positions; its throttle is held as well. So the velocity changes from that of knot k to that of
@@ -66,7 +68,8 @@ def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) 
     torques = joint_torques(robot, plan)
     if not rules.instant(plan.rule, "joint_velocities"):
         torques[:, 0] = torques[:, 1]  # such a trajectory doesn't tell the accelerations of its first knot
-    held = np.minimum(np.searchsorted(knots, times - 1e-9), plan.knots)
+    held = np.minimum(np.searchsorted(acting_times(plan)[1] - plan.time[0], times - 1e-9), plan.knots)
+    forces = plan.contact_forces[:, held].T if rules.acts_after(plan.rule) else acting("contact_forces")
     return Reference(
         com=at(plan.com_position, own),
         com_velocity=rate(plan.com_velocity),
@@ -75,7 +78,7 @@ def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) 
         joints=at(plan.joint_positions, own),
         joint_velocities=rate(plan.joint_velocities),
         torques=at(torques, times),
-        contact_forces=acting("contact_forces").reshape(times.size, -1, 3),
+        contact_forces=forces.reshape(times.size, -1, 3),
         thrust=at(plan.thrust, times),
         thrust_rate=acting("thrust_rate") * spooling,
         throttle=plan.throttle[:, held].T,

@@ -12,7 +12,7 @@ from multimodal_to.simulation.model import TIME_STEP
 from multimodal_to.simulation.playback import Playback
 from multimodal_to.simulation.stabiliser import rotation_vector
 from multimodal_to.trajectory import Trajectory
-from multimodal_to.trajectory.derived import base_poses, contact_points, loaded_force
+from multimodal_to.trajectory.derived import acting_times, base_poses, contact_points, loaded_force
 
 BLINK = 0.1
 """A foot that stands or floats for less than this hasn't switched [s]."""
@@ -165,13 +165,14 @@ def _edges(times: Array, stands: Array) -> list[tuple[float, bool]]:
 def simulated_trajectory(playback: Playback) -> Trajectory:
     """Return the motion at the instants of the plan, under the plan's scenario and rule, to be drawn beside it.
 
-    Rates are differences of columns, and contact forces and throttles means over the interval before each knot.
+    Rates are differences of columns. Contact forces and throttles are means over the time in which those of the plan
+    act: `derived.acting_times`.
     """
     robot, plan = playback.robot, playback.plan
     grid = plan.time - plan.time[0]
-    rows = np.clip(np.searchsorted(playback.time, grid - 1e-9), 0, playback.time.size - 1)
-    during = np.searchsorted(playback.time, plan.times("joint_velocities") - plan.time[0] - 1e-9)
-    during = np.clip(during, 0, playback.time.size - 1)  # the rows at the instants of the velocities
+    rows = _rows(playback, grid)
+    during = _rows(playback, plan.times("joint_velocities") - plan.time[0])
+    acting = [_rows(playback, when - plan.time[0]) for when in acting_times(plan)]
     qpos, qvel = playback.qpos[rows].T, playback.qvel[during].T
     arrays: dict[str, Any] = {
         "base_position": qpos[:3],
@@ -181,10 +182,10 @@ def simulated_trajectory(playback: Playback) -> Trajectory:
         "base_angular_velocity": qvel[3:6],
         "joint_velocities": qvel[6:],
         "com_position": playback.com[rows].T,
-        "contact_forces": _means(playback.contact_forces.reshape(playback.time.size, -1), rows),
+        "contact_forces": _means(playback.contact_forces.reshape(playback.time.size, -1), *acting),
         "thrust": playback.thrust[rows].T,
         "thrust_rate": playback.thrust_rate[during].T,
-        "throttle": _means(playback.throttle, rows),
+        "throttle": _means(playback.throttle, *acting),
     }
     motion = replace(plan, scenario=f"{plan.scenario} in MuJoCo", solve_json="", **arrays)
     points = contact_points(robot, motion)
@@ -206,13 +207,17 @@ def simulated_trajectory(playback: Playback) -> Trajectory:
     return replace(motion, **arrays)
 
 
+def _rows(playback: Playback, times: Array) -> np.ndarray:
+    """Return the rows of a playback at times since its start [s]; before it the first, after it the last."""
+    return np.clip(np.searchsorted(playback.time, times - 1e-9), 0, playback.time.size - 1)
+
+
 def _rates(values: Array, grid: Array) -> Array:
     """Return backward differences, zero at the first knot."""
     return np.asarray(np.diff(values, axis=1, prepend=values[:, :1]) / np.diff(grid, prepend=grid[0] - 1.0))
 
 
-def _means(values: Array, rows: Array) -> Array:
-    """Return the means over the steps up to each of `rows` since the one before, (columns, rows)."""
-    starts = np.concatenate([[0], rows[:-1]])
-    means = [values[start : max(end, start + 1)].mean(axis=0) for start, end in zip(starts, rows, strict=True)]
-    return np.array(means).reshape(len(rows), values.shape[1]).T
+def _means(values: Array, starts: Array, ends: Array) -> Array:
+    """Return the means over the steps from each start to its end, at least over one, (columns, starts)."""
+    means = [values[start : max(end, start + 1)].mean(axis=0) for start, end in zip(starts, ends, strict=True)]
+    return np.array(means).reshape(len(starts), values.shape[1]).T

@@ -118,11 +118,42 @@ def surface_frames(surface: Surface, points: Array) -> tuple[Array, Array, Array
     return d.reshape(shape), n.T.reshape(*shape, 3), t.reshape(3, count, 2).transpose(1, 0, 2).reshape(*shape, 3, 2)
 
 
+def acting_times(trajectory: Trajectory) -> tuple[Array, Array]:
+    """Return from when to when the contact forces and throttles of each column act [s], (knots + 1,) each.
+
+    Under leapfrog from half an interval before the knot to half an interval after it, else over the interval that ends
+    there. Nothing acts before the first knot and after the last.
+    """
+    time, after = trajectory.time, rules.acts_after(trajectory.rule)
+    before = np.diff(time, prepend=time[0])
+    return time - (1.0 - after) * before, time + after * np.append(before[1:], 0.0)
+
+
+def greatest_while_acting(values: Array, rule: str, *, of_intervals: bool = False) -> Array:
+    """Return the greatest value of the knots, or of the intervals, that the contact force of each column reaches.
+
+    A force of an interval has both of its ends. A force of leapfrog has the knots k − 1, k and k + 1 and the intervals
+    between them, since a point that carries it has to stand when it begins and until it ends. A force of backward Euler
+    has its knot and the interval that ends there.
+
+    Args:
+        values: of the knots, or of the intervals that end there, (..., knots + 1).
+        rule: name of the integration rule.
+        of_intervals: the values are those of intervals.
+    """
+    found, after = values, rules.acts_after(rule) > 0.0
+    if not of_intervals and (after or rules.held(rule, "contact_forces")):
+        found = np.maximum(found, np.concatenate([values[..., :1], values[..., :-1]], axis=-1))
+    if after:
+        found = np.maximum(found, np.concatenate([values[..., 1:], values[..., -1:]], axis=-1))
+    return np.asarray(found)
+
+
 def contact_products(robot: Robot, trajectory: Trajectory, surface: Surface) -> tuple[Array, Array]:
     """Return what complementarity bounds [N m], (contacts, knots + 1) each: height and slip, times the normal force.
 
-    The slip is that over the interval that ends at the knot, ‖tᵀ Δp‖. Where a contact force is that of an interval, the
-    height is the greater one of the interval's ends.
+    The slip is ‖tᵀ Δp‖ over an interval. Height and slip are the greatest ones of the knots and intervals that the
+    force reaches: `greatest_while_acting`.
 
     Args:
         robot: the robot of the trajectory; its contact points come from forward kinematics.
@@ -133,9 +164,9 @@ def contact_products(robot: Robot, trajectory: Trajectory, surface: Surface) -> 
     heights, normals, tangents = surface_frames(surface, points)
     normal = np.einsum("ckx,cxk->ck", normals, trajectory.per_contact("contact_forces"))
     moves = np.diff(points, axis=1, prepend=points[:, :1])
-    if rules.held(trajectory.rule, "contact_forces"):
-        heights = np.maximum(heights, np.hstack([heights[:, :1], heights[:, :-1]]))
-    return heights * normal, np.linalg.norm(np.einsum("ckxt,ckx->ckt", tangents, moves), axis=2) * normal
+    slips = np.linalg.norm(np.einsum("ckxt,ckx->ckt", tangents, moves), axis=2)
+    heights = greatest_while_acting(heights, trajectory.rule)
+    return heights * normal, greatest_while_acting(slips, trajectory.rule, of_intervals=True) * normal
 
 
 def thrust_forces(robot: Robot, trajectory: Trajectory) -> tuple[Array, Array]:
@@ -168,7 +199,8 @@ def footsteps(robot: Robot, trajectory: Trajectory, surface: Surface) -> list[Fo
     """Return the steps in the order in which they start.
 
     A foot stands while one of its contact points carries more than `loaded_force`. What is in between is a step if the
-    foot's lowest point was at least `step_lift` high and its middle came down at least `step_length` away.
+    foot's lowest point was at least `step_lift` high and its middle came down at least `step_length` away. It lifts off
+    when its last force ends and touches down when the next one begins; under backward Euler, at the knots of these.
 
     Args:
         robot: says which contact points make a foot.
@@ -180,7 +212,7 @@ def footsteps(robot: Robot, trajectory: Trajectory, surface: Surface) -> list[Fo
     normal = np.einsum("ckx,cxk->ck", normals, trajectory.per_contact("contact_forces"))
     loaded = normal > loaded_force(robot)
     steps, least_length, least_lift = [], step_length(robot), step_lift(robot)
-    over_interval = int(rules.held(trajectory.rule, "contact_forces"))  # then load begins at the interval's start
+    begins, ends = _bounds_of_columns(trajectory)
     for foot in dict.fromkeys(contact.foot for contact in robot.contacts):
         members = [index for index, contact in enumerate(robot.contacts) if contact.foot == foot]
         lowest, middle = heights[members].min(axis=0), points[members].mean(axis=0)[:, :2]
@@ -189,33 +221,53 @@ def footsteps(robot: Robot, trajectory: Trajectory, surface: Surface) -> list[Fo
             length = float(np.linalg.norm(middle[after] - middle[before]))
             lift = float(lowest[before : after + 1].max())
             if length >= least_length and lift >= least_lift:
-                start, end = float(trajectory.time[before]), float(trajectory.time[after - over_interval])
-                steps.append(Footstep(foot=foot, lift_off=start, touch_down=end, length=length, lift=lift))
+                up, down = float(ends[before]), float(begins[after])
+                steps.append(Footstep(foot=foot, lift_off=up, touch_down=down, length=length, lift=lift))
     return sorted(steps, key=lambda step: step.lift_off)
 
 
 def flight_phases(robot: Robot, trajectory: Trajectory) -> list[tuple[float, float]]:
-    """Return start and end [s] of each run of knots in flight, or of intervals where contact forces belong to these.
+    """Return start and end [s] of each run of columns in flight.
+
+    It is the time over which their contact forces would act, `acting_times`; under backward Euler it is that from knot
+    to knot.
 
     Args:
         robot: whose weight is the measure, `flight_force`.
         trajectory: the motion.
     """
-    aloft = flying(robot, trajectory)
-    by_interval = rules.held(trajectory.rule, "contact_forces")
-    if by_interval:
-        aloft = np.concatenate(([False], aloft[1:]))  # no interval ends at the first knot
-    edges = np.concatenate(([False], aloft, [False]))
-    starts, ends = np.flatnonzero(~edges[:-1] & edges[1:]), np.flatnonzero(edges[:-1] & ~edges[1:]) - 1
-    starts -= by_interval
-    return [(float(trajectory.time[i]), float(trajectory.time[j])) for i, j in zip(starts, ends, strict=True)]
+    phases = spans(flying(robot, trajectory), *_bounds_of_columns(trajectory))
+    if rules.held(trajectory.rule, "contact_forces"):
+        return [(start, end) for start, end in phases if end > start]  # no interval ends at the first knot
+    return phases
+
+
+def _bounds_of_columns(trajectory: Trajectory) -> tuple[Array, Array]:
+    """Return `acting_times`, but the knots themselves where every quantity is at its knot."""
+    if rules.all_at_knots(trajectory.rule):
+        return trajectory.time, trajectory.time
+    return acting_times(trajectory)
+
+
+def spans(chosen: np.ndarray, begins: Array, ends: Array) -> list[tuple[float, float]]:
+    """Return start and end [s] of each run of chosen columns.
+
+    Args:
+        chosen: which columns are, (knots + 1,).
+        begins: when each column begins [s], (knots + 1,).
+        ends: when each column ends [s], (knots + 1,).
+    """
+    edges = np.concatenate(([False], chosen, [False]))
+    first, last = np.flatnonzero(~edges[:-1] & edges[1:]), np.flatnonzero(edges[:-1] & ~edges[1:]) - 1
+    return [(float(begins[i]), float(ends[j])) for i, j in zip(first, last, strict=True)]
 
 
 def at_knots(trajectory: Trajectory, name: str) -> Array:
     """Return a quantity at the instants of the knots, (rows, knots + 1).
 
-    Under a staggered rule two intervals meet at a knot, and it is the mean of theirs; an acceleration is that between
-    them. After the last knot there is no interval: there it is that of the last one, and an acceleration is zero.
+    Where a quantity is in the middles of intervals, two of these meet at a knot, and it is the mean of theirs; an
+    acceleration is that between them. After the last knot there is no interval: there it is that of the last one, and
+    an acceleration is zero.
     """
     values: Array = getattr(trajectory, name)
     before = rules.instant(trajectory.rule, name)
@@ -261,6 +313,11 @@ def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
 
     τ = M ν̇ + C ν + g − Σ Jᵀ f by RNEA: the wrench left for the base [N, N m], which is zero on a true motion, then the
     joint torques [N m]. All is at the instants of the knots: `at_knots`, `accelerations_at_knots`.
+
+    Where velocities are in the middles of intervals, the velocity jumps at a knot, from ν⁻ to ν⁺. Each holds for half
+    of the time from middle to middle. So the velocity products there are the mean of those of both, not those of the
+    mean velocity ν̄. C ν is a quadratic form c(ν), so this is ½ (c(ν⁻) + c(ν⁺)) = c(ν̄) + c(½ (ν⁺ − ν⁻)). It is what
+    the momentum's rows say, and the wrench left for the base is then of a higher order in Δt.
     """
     robot, count = robot.with_jets(trajectory.jet_names), trajectory.time.size
     names = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
@@ -269,7 +326,7 @@ def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
     frames = (*trajectory.contact_names, *(jet.frame for jet in robot.jets))
     thrusts = thrust_forces(robot, trajectory)[1].transpose(0, 2, 1)
     contacts = at_knots(trajectory, "contact_forces").reshape(len(trajectory.contact_names), 3, count)
-    return np.array(
+    asked = np.array(
         robot.kindyn.rnea_fun(frames).map(count)(
             np.hstack(list(base_poses(trajectory))),
             trajectory.joint_positions,
@@ -280,6 +337,21 @@ def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
             *(np.vstack([force, np.zeros((3, count))]) for force in (*contacts, *thrusts)),
         )
     )
+    if not rules.instant(trajectory.rule, "joint_velocities"):
+        return asked
+    half = 0.5 * accelerations * np.diff(trajectory.time, append=trajectory.time[-1])  # ½ (ν⁺ − ν⁻)
+    return asked + _velocity_products(robot, trajectory, half)
+
+
+def _velocity_products(robot: Robot, trajectory: Trajectory, velocities: Array) -> Array:
+    """Return c(ν) = C ν, Coriolis and centrifugal terms of other velocities at the knots, (6 + n, knots + 1)."""
+    count, nothing = trajectory.time.size, np.zeros_like(velocities)
+    poses, function = np.hstack(list(base_poses(trajectory))), robot.kindyn.rnea_fun(()).map(count)
+    moving, still = (
+        np.array(function(poses, trajectory.joint_positions, some[:6], some[6:], nothing[:6], nothing[6:]))
+        for some in (velocities, nothing)
+    )
+    return np.asarray(moving - still)
 
 
 def joint_torques(robot: Robot, trajectory: Trajectory) -> Array:
@@ -294,7 +366,7 @@ def joint_torques(robot: Robot, trajectory: Trajectory) -> Array:
 def without_acceleration(trajectory: Trajectory) -> int:
     """Return the index of the knot whose acceleration the trajectory does not tell: the first, 0, or the last, −1.
 
-    Backward Euler tells accelerations of intervals' ends; the staggered rule, of knots where two intervals meet.
+    Backward Euler tells accelerations of intervals' ends; leapfrog, of knots where two intervals meet.
     """
     return -1 if rules.instant(trajectory.rule, "joint_velocities") else 0
 

@@ -47,6 +47,14 @@ def all_at_knots(rule: str) -> bool:
     return not INSTANTS.get(rule)
 
 
+def acts_after(rule: str) -> float:
+    """Return until how far after its knot a contact force or a throttle acts, in intervals.
+
+    It acts for one interval. Under leapfrog its knot is in the middle of that; else the knot is the end.
+    """
+    return 0.5 if rule == LEAPFROG else 0.0
+
+
 def held(rule: str, name: str) -> bool:
     """Return whether a quantity is constant over the interval that ends at its knot."""
     return bool(instant(rule, name)) and name in HELD

@@ -116,7 +116,7 @@ class Trajectory:
         return record
 
     def unusual_formulation(self) -> str:
-        """Return in words how the problem that was solved differs from the paper's, by the names of its terms.
+        """Return in words how the problem that was solved differs from the usual one of its rule, by names of terms.
 
         Empty where it does not differ, or where the file does not say. A file keeps the names of terms, not the terms.
 
@@ -128,7 +128,7 @@ class Trajectory:
             return ""
         parts = [
             f"{words} {', '.join(str(name) for name in names)}"
-            for key, words in (("own_terms", "terms of its own:"), ("left_out", "left out of the paper's:"))
+            for key, words in (("own_terms", "terms of its own:"), ("left_out", "left out:"))
             if isinstance(names := record.get(key), list) and names
         ]
         if self.rule not in rules.INSTANTS:
