@@ -214,7 +214,7 @@ def _flow(
         return np.hstack([*parts_given, acting(plan.contact_forces, index), acting(plan.throttle, index)])
 
     def acting(values: np.ndarray, index: int) -> np.ndarray:
-        """Return what acts just before an instant; by leapfrog, which has it in the middle, the mean with just after."""
+        """Return what acts just before an instant; by leapfrog, whose steps have it in the middle, also just after."""
         share = index / parts - rules.acts_after(plan.rule)
         until = values[:, first + int(np.ceil(share))].T
         since = values[:, np.minimum(first + int(np.floor(share)) + 1, plan.knots)].T

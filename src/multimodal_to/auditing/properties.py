@@ -210,8 +210,8 @@ _ACTUATION_AND_CONTACT = (
         unit="N",
         limit=5.0,
         first_order_limit=10.0,
-        reason="chosen, twice what plans by a rule of order two with steps of 0.2 s are off where throttles jump; by one "
-        "of order one, a sixteenth of the smaller turbine's 160 N",
+        reason="chosen, twice what plans by a rule of order two with steps of 0.2 s are off where throttles jump; by "
+        "one of order one, a sixteenth of the smaller turbine's 160 N",
         meaning="thrust at an interval's end minus that of an adaptive integrator started at the interval's start",
         judged=Judged.WITH_JETS,
     ),
@@ -220,8 +220,8 @@ _ACTUATION_AND_CONTACT = (
         unit="N",
         limit=5.0,
         first_order_limit=20.0,
-        reason="chosen: the limit of one interval, since errors of a rule of order two do not add up; by one of order one "
-        "twice as much",
+        reason="chosen: the limit of one interval, since errors of a rule of order two do not add up; by one of order "
+        "one, twice as much",
         meaning="thrust at a knot minus that of an adaptive integrator started at the first knot",
         judged=Judged.WITH_JETS,
     ),
