@@ -214,16 +214,18 @@ def _flow(
         return np.hstack([*parts_given, acting(plan.contact_forces, index), acting(plan.throttle, index)])
 
     def acting(values: np.ndarray, index: int) -> np.ndarray:
-        """Return what acts just before an instant; by leapfrog, which has it in the middle, the mean with just after."""
+        """Return what acts just before an instant; by leapfrog, whose steps have it in the middle, also just after."""
         share = index / parts - rules.acts_after(plan.rule)
         until = values[:, first + int(np.ceil(share))].T
         since = values[:, np.minimum(first + int(np.floor(share)) + 1, plan.knots)].T
         return 0.5 * (until + since) if rules.acts_after(rule.name) else until
 
-    jets, state = len(robot.jets), controls.starts[first].copy()
-    back = controls.slope(state, 2 * controls.steps * first, first) * dt
-    state[:, 3:9] -= rules.instant(rule.name, "com_velocity") * back[:, 3:9]
-    state[:, 13 + jets :] -= rules.instant(rule.name, "thrust_rate") * back[:, 13 + jets :]
+    jets, start = len(robot.jets), controls.starts[first]
+    shares = np.zeros(start.shape[1])
+    shares[3:9], shares[13 + jets :] = (rules.instant(rule.name, name) for name in ("com_velocity", "thrust_rate"))
+    state = start
+    for _ in range(20):  # velocities before the first knot, from which `Controls.starts` leads to those of the knot
+        state = start - shares * dt * controls.slope(state, 2 * controls.steps * first, first)
     bases = np.zeros((first.size, 9))
     bases[:, :3] = plan.base_position[:, first].T
     unknown = np.hstack([state, bases])

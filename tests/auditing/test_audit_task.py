@@ -14,6 +14,7 @@ from multimodal_to.auditing.thrust import thrust_findings
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.scenarios import Start, Terminal
 from multimodal_to.scenarios.data import stored, to_json
+from multimodal_to.trajectory import rules
 from synthetic import take_off as synthetic_take_off
 
 
@@ -59,6 +60,8 @@ def test_a_motion_that_misses_its_task_is_found_where_it_does(
     ironcub, take_off, property_name, quantity, row, knot, amount
 ):
     trajectory = take_off.trajectory
+    if property_name in ("end: force balance", "end: moment balance"):
+        knot -= bool(rules.instant(trajectory.rule, "com_velocity"))  # the last knot from which a row leads on
     assert audit(ironcub, trajectory)[property_name].holds
     finding = audit(ironcub, spoiled(trajectory, quantity, row, knot, amount))[property_name]
     assert not finding.holds

@@ -43,7 +43,7 @@ def test_the_take_off_is_followed_with_the_order_that_the_rule_says(ironcub, tak
     controls = Controls.of(Motion.of(ironcub, take_off.trajectory), steps=16)
     found = refinement.errors(controls, refinement.RULES[rule], refinement.PARTS, starts=6)
     com, base = [entry.com for entry in found], [entry.base for entry in found]
-    assert com[0] > 1e-3
+    assert com[0] > 1e-4
     assert refinement.orders(com)[-1] == pytest.approx(order, abs=0.2)
     assert refinement.orders(base)[-1] == pytest.approx(order, abs=0.3)
 

@@ -286,7 +286,7 @@ def test_joint_torques_give_the_power_that_moves_the_joints(ironcub, trajectory)
 
 
 def test_velocity_products_at_a_knot_are_the_mean_of_those_before_and_after_it(ironcub, trajectory):
-    """Each of two velocities holds for half of the time; with the mean velocity alone the base would lack a wrench."""
+    """Each of two velocities holds for half of the time; with the mean velocity alone a wrench is left for the base."""
     rng = np.random.default_rng(8)
     n, step, knot = len(ironcub.joint_names), DURATION / KNOTS, 7
     velocities = rng.normal(size=(6 + n, KNOTS + 1))
