@@ -17,7 +17,7 @@ from multimodal_to.trajectory.derived import loaded_force, surface_frames
 
 GLIDE_HEIGHT = 0.01
 """Below this height over a whole interval a contact point is near the ground [L]."""
-GLIDE_SPEED = 0.02
+GLIDE_SPEED = 0.03
 """Greatest speed along the ground of a contact point that is near it and carries no load [√(g L)]."""
 THROTTLE_RATE = 200.0
 """Greatest rate of a throttle [%/s]."""
@@ -51,7 +51,7 @@ MARGINS = (
         unit="m/s",
         limit=GLIDE_SPEED,
         of=Of.SPEED,
-        reason="chosen, for the iRonCub 5 cm/s: a point that touches the ground by mistake is then dragged by no more "
+        reason="chosen, for the iRonCub 7 cm/s: a point that touches the ground by mistake is then dragged by no more "
         "than its height in 0.1 s",
         meaning="speed along the ground of a contact point that carries no load and is less than "
         f"{GLIDE_HEIGHT:g} L off the ground over a whole interval: a foot that swings has to be lifted",

@@ -119,7 +119,7 @@ class Margins:
     """Size of the sole that a foot's centre of pressure stays in, as a share of the whole sole [1]."""
     touch_down_speed: float = 0.04
     """Greatest speed at which a contact point comes to the ground [√(g L)]."""
-    distance: float = 0.03
+    distance: float = 0.01
     """Least distance between links of the robot that are not neighbours [L]."""
 
     def __post_init__(self) -> None:
