@@ -66,7 +66,7 @@ KINDS = {
 
 def scenario_of(name: str) -> mt.Scenario:
     """Return a bundled scenario, or that of a TOML file."""
-    return load(name) if name.endswith(".toml") else mt.scenarios.find(name)
+    return load(name) if name.endswith(".toml") else mt.scenarios.paper(name)
 
 
 def higher(scenario: mt.Scenario) -> mt.Scenario:
@@ -116,11 +116,11 @@ def library(name: str) -> Figures:
     """Build, solve, solve again from the answer, and solve with compiled derivatives, in this process."""
     robot, scenario = mt.load_robot("ironcub"), scenario_of(name)
     started = time.perf_counter()
-    problem = mt.build(robot, scenario)
+    problem = mt.build(robot, scenario, mt.Formulation.paper())
     built = time.perf_counter() - started
     cold = mt.solve(problem)
     peak = peak_memory()
-    warm_problem = mt.build(robot, higher(scenario))
+    warm_problem = mt.build(robot, higher(scenario), mt.Formulation.paper())
     warm = mt.solve(warm_problem, start=cold.trajectory)
     return {
         "variables": problem.lower.size,
@@ -144,12 +144,12 @@ def with_compiled(robot: mt.Robot, scenario: mt.Scenario) -> Figures:
     """Compile the derivatives, build with them and solve."""
     started = time.perf_counter()
     try:
-        mt.precompile(robot, scenario)
+        mt.precompile(robot, scenario, mt.Formulation.paper())
     except mt.MultimodalError as error:
         return {"compiled": str(error)}
     spent = time.perf_counter() - started
     started = time.perf_counter()
-    problem = mt.build(robot, scenario)
+    problem = mt.build(robot, scenario, mt.Formulation.paper())
     built = time.perf_counter() - started
     solution = mt.solve(problem)
     return {
@@ -175,7 +175,7 @@ def judged(problem: mt.Problem, solution: mt.Solution) -> Figures:
 @empty_cache()
 def tight(name: str) -> Figures:
     """Solve, go on from the answer with a smaller tolerance, and compare the objectives."""
-    problem = mt.build(mt.load_robot("ironcub"), scenario_of(name))
+    problem = mt.build(mt.load_robot("ironcub"), scenario_of(name), mt.Formulation.paper())
     default = mt.Ipopt()
     answer = mt.solve(problem, default)
     tighter = mt.solve(problem, replace(default, tolerance=TIGHTER * default.tolerance), start=answer.trajectory)
@@ -198,7 +198,7 @@ def growth(knots: str) -> Figures:
     """Iterate the take-off on a grid of so many knots."""
     scenario = on_grid(mt.scenarios.take_off(), int(knots))
     started = time.perf_counter()
-    problem = mt.build(mt.load_robot("ironcub"), scenario)
+    problem = mt.build(mt.load_robot("ironcub"), scenario, mt.Formulation.paper())
     built = time.perf_counter() - started
     solution = mt.solve(problem, mt.Ipopt(max_iterations=GROWTH_ITERATIONS))
     return {
