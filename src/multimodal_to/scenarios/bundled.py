@@ -67,7 +67,7 @@ def landing() -> Scenario:
 def take_off_and_landing() -> Scenario:
     """Return the vertical take-off and landing as one problem: above 0.75 m at mid-horizon, and standing again.
 
-    Weights are the landing's, for its reasons, but for the legs' speed and for feet that shall not glide at lift-off. The
+    Weights are the landing's, for its reasons, but for the legs' speed, and feet that shall not glide at lift-off. The
     text has 0.70 m, with which this robot is in the air for 0.9 s.
     """
     return Scenario(
