@@ -108,7 +108,7 @@ HOPELESS = {
     "too little time for the distance": (
         same,
         "jump",
-        {"knots": 6, "mid_height_min": None, "final_com": (-0.3, 0.0, 0.57)},
+        {"knots": 15, "mid_height_min": None, "final_com": (-0.3, 0.0, 0.57)},
         "time for the distance",
         "friction, 0.33, moves it by at most 0.0809 m",
     ),
@@ -122,7 +122,7 @@ HOPELESS = {
     "no time to fall": (
         same,
         "jump",
-        {"knots": 8, "mid_height_min": 0.9},
+        {"knots": 20, "mid_height_min": 0.9},
         "leap",
         "and back takes 0.49 s, and the horizon is at most 0.4 s long",
     ),
