@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import multimodal_to as mt
+from multimodal_to.auditing.margins import pressure_shares
 from multimodal_to.models import capsule_pairs
 from multimodal_to.models.contact import DESCENT_RATE
 from multimodal_to.models.sole import PRESSURE_SLACK, soles
@@ -215,9 +216,9 @@ def test_a_foot_without_load_is_inside_the_set_and_the_rows_are_labelled_by_edge
     labels = margins.CENTRE_OF_PRESSURE.labels(parameters)
     assert len(labels) == rows.size == 8
     assert rows.min() == 0.0 > -PRESSURE_SLACK
-    assert set(labels[:4]) == {f"l_sole_{a} – l_sole_{b}" for a, b in ((1, 2), (2, 4), (4, 3), (3, 1))} or all(
-        label.count("l_sole_") == 2 for label in labels[:4]
-    )
+    assert [label.count("l_sole_") for label in labels] == [2] * 4 + [0] * 4
+    assert labels[4].startswith("r_sole_")
+    assert len(set(labels)) == 8
 
 
 def test_a_robot_of_point_feet_has_no_rows_of_soles(tmp_path):
@@ -320,18 +321,19 @@ def test_each_margin_has_rows_of_its_own(ironcub, margin, rows):
 SQUAT = replace(
     mt.scenarios.take_off(),
     name="squat",
-    knots=6,
-    interval_max=0.2,
-    final_com=(0.0, 0.0, 0.54),
+    knots=10,
+    interval_min=0.1,
+    interval_max=0.1,
+    final_com=(-0.02, 0.06, 0.54),
     terminal=mt.Terminal.STANDING,
     jets=False,
 )
-TIGHT = Margins(torque=0.35, friction=0.1, pressure=0.2, distance=0.11, touch_down_speed=0.04)
+TIGHT = Margins(torque=0.48, friction=0.4, pressure=0.6, distance=0.085)
 
 
 @pytest.fixture(scope="module")
 def squats(ironcub):
-    """The squat without margins and with some that it does not keep by itself."""
+    """A squat to the front left, without margins and with some that it does not keep by itself."""
     return [mt.solve(mt.build(ironcub, replace(SQUAT, margins=some))) for some in (Margins.none(), TIGHT)]
 
 
@@ -342,41 +344,34 @@ def used(robot, motion):
     shares = [abs(one.torque) / effort[robot.joint_names.index(one.joint)] for one in torques]
     forces = motion.per_contact("contact_forces")[:, :, 1:-1]
     friction = (np.abs(forces[:, :2]) / forces[:, 2:]).max() / robot.friction
-    gauge = 0.0
-    for sole in soles(robot):
-        loads = forces[list(sole.members), 2]
-        there = (sole.places.T @ loads / loads.sum(axis=0)).T
-        for here, next_one in pairwise(sole.places[[*sole.corners, sole.corners[0]]]):
-            outward = np.array([(next_one - here)[1], -(next_one - here)[0]])
-            gauge = max(gauge, (there @ outward / (here @ outward)).max())
+    pressure = [pressure_shares(robot, sole, forces[list(sole.members), 2]).max() for sole in soles(robot)]
     distances = capsule_pairs.distances(robot.kindyn, motion.joint_positions, robot.near_capsule_pairs)
     return {
         "torque": max(shares),
         "friction": friction,
-        "pressure": gauge,
+        "pressure": max(pressure),
         "distance": distances.min() / robot.standing_height,
     }
 
 
 def test_a_plan_keeps_all_of_its_margins_and_without_them_it_would_not(ironcub, squats):
     bare, kept = (used(ironcub, some.trajectory) for some in squats)
-    print(bare, kept)
     assert [some.status for some in squats] == [mt.Status.OPTIMAL] * 2
-    lifted = PRESSURE_SLACK * ironcub.standing_height
-    for name, slack in (("torque", 1e-4), ("friction", 1e-4), ("pressure", 0.1)):
-        assert kept[name] < getattr(TIGHT, name) + slack, name
-        assert bare[name] > getattr(TIGHT, name) + slack, name
-    assert bare["distance"] < TIGHT.distance < kept["distance"] + 2e-3 / ironcub.standing_height
-    assert lifted
+    for name in ("torque", "friction", "pressure"):
+        assert kept[name] < getattr(TIGHT, name) + 1e-4, name
+        assert bare[name] > getattr(TIGHT, name) + 1e-2, name
+    hair = 1e-3 / ironcub.standing_height  # by which the smooth distance is above the exact one
+    assert bare["distance"] < TIGHT.distance - hair < kept["distance"]
 
 
 # ------------------------------------------------------------------------------------------ where it is pulled to
 
 
 def test_a_robot_that_stands_up_is_pulled_to_the_posture_of_the_end(ironcub):
-    """A crouch to a stand: the posture costs nothing where it ends, and the plan ends nearly there."""
+    """A crouch to a stand: the posture costs nothing where it ends, and the plan ends much nearer to it."""
     low, high = (0.0, 0.0, 0.48), (0.0, 0.0, 0.56)
-    stand_up = replace(SQUAT, name="stand up", knots=8, initial_com=low, final_com=high, margins=Margins.none())
+    times = {"knots": 10, "interval_min": 0.2, "interval_max": 0.2}
+    stand_up = replace(SQUAT, name="stand up", **times, initial_com=low, final_com=high, margins=Margins.none())
     problem = mt.build(ironcub, stand_up)
     start, end = (standing_posture(ironcub, stand_up.surface, com).joint_positions for com in (low, high))
     assert np.abs(start - end).max() > 0.3
@@ -391,7 +386,7 @@ def test_a_robot_that_stands_up_is_pulled_to_the_posture_of_the_end(ironcub):
     solution = mt.solve(problem)
     assert solution.status is mt.Status.OPTIMAL
     reached = solution.trajectory.joint_positions[:, -1]
-    assert np.linalg.norm(reached - end) < 0.1 * np.linalg.norm(start - end)
+    assert np.linalg.norm(reached - end) < 0.2 * np.linalg.norm(reached - start)
 
 
 @pytest.mark.parametrize("name", ["landing", "walk-to-fly", "jump"])

@@ -23,7 +23,7 @@ from multimodal_to.solving.solver import StartPoint
 from multimodal_to.trajectory import QUANTITIES
 
 SCENARIO = replace(
-    mt.scenarios.jump(),
+    mt.scenarios.paper("jump"),
     name="stand",
     knots=10,
     mid_height_min=None,
@@ -37,7 +37,8 @@ SCENARIO = replace(
 
 @pytest.fixture(scope="module")
 def problem(ironcub):
-    return mt.build(ironcub, SCENARIO)
+    """By the paper's formulation, with which it is feasible after a few iterations already."""
+    return mt.build(ironcub, SCENARIO, mt.Formulation.paper())
 
 
 @pytest.fixture
