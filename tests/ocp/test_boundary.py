@@ -58,7 +58,9 @@ def test_a_standing_end_is_in_balance_where_no_interval_follows_its_forces(landi
     assert "final_equilibrium" not in paper.rows
 
 
-@pytest.mark.parametrize(("formulation", "free"), [(Formulation.executable(), [1, 2]), (Formulation.paper(), [1, 2, 3])])
+@pytest.mark.parametrize(
+    ("formulation", "free"), [(Formulation.executable(), [1, 2]), (Formulation.paper(), [1, 2, 3])]
+)
 def test_a_hover_at_the_end_has_no_contact_force_where_one_would_push_it_off(ironcub, formulation, free):
     """By leapfrog the forces of the last knot but one make the last velocity."""
     problem = build(ironcub, replace(scenarios.take_off(), **SHORT), formulation)
