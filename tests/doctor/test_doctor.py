@@ -79,7 +79,7 @@ HOPELESS = {
     "an end that legs don't reach": (
         same,
         "take-off-and-landing",
-        {"final_com": (0.0, 0.0, 0.3)},
+        {"final_com": (0.0, 0.0, 0.2)},
         "standing end",
         "the nearest that the legs are found to reach is 0.3",
     ),
@@ -108,7 +108,7 @@ HOPELESS = {
     "too little time for the distance": (
         same,
         "jump",
-        {"knots": 6, "mid_height_min": None, "final_com": (-0.3, 0.0, 0.57)},
+        {"knots": 6, "interval_max": 0.05, "mid_height_min": None, "final_com": (-0.3, 0.0, 0.57)},
         "time for the distance",
         "friction, 0.33, moves it by at most 0.0809 m",
     ),
@@ -122,7 +122,7 @@ HOPELESS = {
     "no time to fall": (
         same,
         "jump",
-        {"knots": 8, "mid_height_min": 0.9},
+        {"knots": 8, "interval_max": 0.05, "mid_height_min": 0.9},
         "leap",
         "and back takes 0.49 s, and the horizon is at most 0.4 s long",
     ),
@@ -175,7 +175,7 @@ def test_what_the_doctor_suggests_helps(ironcub):
     assert not mt.doctor(ironcub, replace(short, knots=knots)).hopeless
     assert mt.doctor(ironcub, replace(short, knots=knots - 1)).hopeless
 
-    low = replace(scenarios.take_off_and_landing(), final_com=(0.0, 0.0, 0.3))
+    low = replace(scenarios.take_off_and_landing(), final_com=(0.0, 0.0, 0.2))
     (error,) = mt.doctor(ironcub, low).of(Severity.ERROR)
     height = float(error.change.split(" is ")[1].split()[0])
     assert not mt.doctor(ironcub, replace(low, final_com=(0.0, 0.0, height + 1e-3))).hopeless

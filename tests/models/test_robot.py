@@ -89,7 +89,7 @@ def test_an_effort_limit_is_that_of_robot_toml_and_else_that_of_the_urdf(folder)
     robot = load_robot(folder)
     assert effort_of(robot, "l_knee") == 9999.0
     assert effort_of(robot, "r_knee") == 12.5
-    edit(folder, "home = 0.379599880, effort = 37.0 }", "home = 0.379599880 }")
+    edit(folder, "home = 0.379599880, effort = 60.0 }", "home = 0.379599880 }")
     assert effort_of(load_robot(folder), "torso_pitch") == np.inf  # the URDF has a placeholder
 
 
@@ -121,11 +121,11 @@ def test_every_motor_of_the_ironcub_has_a_limit_and_holds_the_robot_up_by_its_je
         ("friction = 0.33", "", "the robot lacks 'contact.friction'"),
         ("speed = 7.0, ", "", "the robot lacks 'joints.torso_pitch.speed'"),
         (
-            "effort = 37.0",
+            "effort = 60.0",
             "effort = 0",
             "'joints.torso_pitch': effort is 0.0; expected a number above 0 and below 10000",
         ),
-        ("effort = 37.0", "effort = 5e4", "'joints.torso_pitch': effort is 50000.0; expected a number above 0 and"),
+        ("effort = 60.0", "effort = 5e4", "'joints.torso_pitch': effort is 50000.0; expected a number above 0 and"),
         ("speed = 7.0", "speed = 0", "'joints.torso_pitch': speed is 0.0; expected a positive number"),
         ('torso = ["torso_pitch", ', 'torso = ["torso_yaw", ', "joint group 'torso': joint given twice: torso_yaw"),
         ('torso = ["torso_pitch", ', "torso = [3, ", "'joint_groups.torso[0]' is 3; expected a text"),

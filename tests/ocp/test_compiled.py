@@ -141,7 +141,7 @@ def test_derivatives_of_own_terms_are_compiled_too(ironcub, hop, files, monkeypa
     def slow_turns(knot, parameters):
         return knot.base_angular_velocity
 
-    own = mt.Formulation.paper().with_terms(mt.Cost(residual=slow_turns, weight=1e2, unit="rad/s"))
+    own = mt.Formulation.executable().with_terms(mt.Cost(residual=slow_turns, weight=1e2, unit="rad/s"))
     assert not set(map(str, _costly(ironcub, hop, own))) & set(map(str, files))
     monkeypatch.setattr(compiled, "_FLAGS", ("-O0", "-shared", "-fPIC"))
     assert not mt.build(ironcub, hop, own).nlp.compiled

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import casadi as cs
 import numpy as np
@@ -12,7 +12,8 @@ import pytest
 import multimodal_to as mt
 from drones import drone
 from multimodal_to.errors import FormulationError
-from multimodal_to.ocp import BackwardEuler, Variable, paper
+from multimodal_to.ocp import BackwardEuler, Variable, margins, paper
+from multimodal_to.ocp.knot import Knot
 from multimodal_to.trajectory.derived import frame_poses
 
 SQUAT = replace(
@@ -57,7 +58,7 @@ GENTLE = mt.Constraint(
 
 @pytest.fixture(scope="module")
 def plain(ironcub):
-    return mt.solve(mt.build(ironcub, SQUAT))
+    return mt.solve(mt.build(ironcub, SQUAT, PAPER))
 
 
 @pytest.fixture(scope="module")
@@ -412,11 +413,19 @@ def test_the_units_of_mechanics_are_known(unit):
 # -------------------------------------------------------------------- the formulation
 
 
-def test_the_paper_is_the_default(ironcub):
-    explicit, default = mt.build(ironcub, SQUAT, PAPER), mt.build(ironcub, SQUAT)
-    assert default.formulation == PAPER
+def test_the_executable_one_is_the_default(ironcub):
+    executable = mt.Formulation.executable()
+    explicit, default = mt.build(ironcub, SQUAT, executable), mt.build(ironcub, SQUAT)
+    assert default.formulation == executable
     assert np.array_equal(explicit.rows_at(explicit.guess), default.rows_at(default.guess))
-    assert (PAPER.own_terms, PAPER.left_out) == ((), ())
+    for formulation in (executable, PAPER):
+        assert (formulation.own_terms, formulation.left_out) == ((), ())
+
+
+def test_the_executable_one_holds_all_of_the_papers_terms_and_the_margins():
+    names = [term.name for term in mt.Formulation.executable().terms]
+    assert names[: len(PAPER.terms)] == [term.name for term in PAPER.terms]
+    assert names[len(PAPER.terms) :] == [term.name for term in (*paper.LEAPFROG, *margins.TERMS)]
 
 
 def test_a_term_of_the_paper_can_be_left_out(ironcub):
@@ -456,14 +465,15 @@ def test_a_formulation_that_makes_no_problem_is_refused(change, sentence):
     assert sentence in str(error.value)
 
 
-def test_every_term_of_the_paper_says_its_formula_and_has_a_name_of_its_own():
-    assert len({term.name for term in paper.TERMS}) == len(paper.TERMS)
-    assert all(term.formula for term in paper.TERMS)
+@pytest.mark.parametrize("formulation", [PAPER, mt.Formulation.executable()], ids=["paper", "executable"])
+def test_every_term_says_its_formula_and_has_a_name_of_its_own(formulation):
+    assert len({term.name for term in formulation.terms}) == len(formulation.terms)
+    assert all(term.formula for term in formulation.terms)
 
 
 @dataclass(frozen=True)
 class Midpoint:
-    """What acts is the mean of both ends."""
+    """The trapezoid: what acts is the mean of both ends."""
 
     name: str = "trapezoid"
 
@@ -471,7 +481,8 @@ class Midpoint:
         return (quantity(start) + quantity(end)) / 2.0
 
     def at_accelerations(self, start, end):
-        return replace(end, thrust=0.5 * (start.thrust + end.thrust))
+        names = [entry.name for entry in fields(Knot) if entry.name != "robot"]
+        return replace(end, **{name: 0.5 * (getattr(start, name) + getattr(end, name)) for name in names})
 
     def at_velocities(self, end, duration):
         return end

@@ -11,7 +11,7 @@ import pytest
 from multimodal_to import scenarios
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.terrain import HeightField
-from multimodal_to.ocp import build
+from multimodal_to.ocp import Formulation, build
 from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios import Terminal, Weights
 
@@ -119,27 +119,37 @@ def test_every_weight_names_a_cost_and_zero_weights_add_nothing(ironcub, problem
     assert bare.costs(x)["thrust"] == pytest.approx(2.0 * 0.1 * np.sum(thrust[:, 1:] ** 2))
 
 
+PAPER_ROWS = {
+    "com_kinematics",
+    "angular_momentum_kinematics",
+    "contact_kinematics",
+    "friction_cone",
+    "complementarity",
+    "contact_reach",
+    "jet_reach",
+    "static_equilibrium",
+    "momentum_dynamics",
+    "com_integration",
+    "base_position_integration",
+    "base_orientation_integration",
+    "joint_integration",
+    "thrust_integration",
+    "thrust_dynamics",
+    "sliding",
+}
+LEAPFROG_ROWS = {"complementarity_before", "complementarity_after", "sliding_after", "final_steady_thrust"}
+MARGIN_ROWS = {"centre_of_pressure", "touch_down", "joint_torques", "link_distances"}
+
+
 def test_every_set_of_rows_has_the_name_of_its_function(problem):
-    assert set(problem.rows) == {
-        "com_kinematics",
-        "angular_momentum_kinematics",
-        "contact_kinematics",
-        "friction_cone",
-        "complementarity",
-        "contact_reach",
-        "jet_reach",
-        "static_equilibrium",
-        "momentum_dynamics",
-        "com_integration",
-        "base_position_integration",
-        "base_orientation_integration",
-        "joint_integration",
-        "thrust_integration",
-        "thrust_dynamics",
-        "sliding",
-    }
+    assert set(problem.rows) == PAPER_ROWS | LEAPFROG_ROWS | MARGIN_ROWS
     everything = np.sort(np.concatenate([rows.index for rows in problem.rows.values()]))
     assert np.array_equal(everything, np.arange(problem.row_lower.size))
+
+
+def test_the_papers_problem_has_the_papers_rows_alone(ironcub):
+    problem = build(ironcub, replace(scenarios.paper("take-off"), knots=3), Formulation.paper())
+    assert set(problem.rows) == PAPER_ROWS
 
 
 def test_rows_of_one_variable_become_bounds(problem):

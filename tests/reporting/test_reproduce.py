@@ -16,6 +16,7 @@ from multimodal_to.reporting import report, reproduce
 from multimodal_to.reporting.comparison import AUDITS, SOLVES, markdown, table
 from multimodal_to.reporting.published import PUBLISHED
 from multimodal_to.reporting.reproduce import Run, read_published
+from multimodal_to.scenarios.data import stored
 from multimodal_to.trajectory import QUANTITIES
 from multimodal_to.trajectory.importing import COMPUTED
 from synthetic import take_off as synthetic_take_off
@@ -30,6 +31,7 @@ def run(ironcub, take_off) -> Run:
         trajectory=take_off.trajectory,
         report=report,
         steps=0,
+        executable=True,
         solution=take_off,
         whole_time=99.0,
     )
@@ -44,13 +46,19 @@ def bare(ironcub, tmp_path_factory):
     return folder
 
 
+def as_in_paper(run):
+    """The run as if it had been that of the paper's problem."""
+    return replace(run, executable=False)
+
+
 def cells(results, label):
     return next(dict(zip(results.titles, row, strict=True)) for row in results.rows if row[0] == label)
 
 
-def test_the_papers_figures_stand_below_the_run_of_their_scenario(run):
-    results = table([run], SOLVES)
-    assert [row[0] for row in results.rows] == ["take-off", "take-off, paper"]
+def test_the_papers_figures_stand_below_the_run_of_the_papers_problem(run):
+    results = table([run, as_in_paper(run)], SOLVES)
+    assert [row[0] for row in results.rows] == ["take-off", "take-off, the paper's problem", "take-off, paper"]
+    assert [row[0] for row in table([run], SOLVES).rows] == ["take-off"]
     ours, paper = cells(results, "take-off"), cells(results, "take-off, paper")
     assert (ours["status"], ours["iterations"], ours["in all [s]"]) == ("optimal", str(run.solution.iterations), "99")
     assert (ours["steps"], ours["thrust / weight"]) == ("0", "1.00")
@@ -78,8 +86,9 @@ def test_the_verdict_is_the_audits_and_names_the_allowances_it_used(ironcub, run
 def test_published_files_are_audited_as_rows_of_the_same_tables(ironcub, run, bare):
     (published,) = read_published(ironcub, bare)
     assert not published.holds
-    results = table([run, published], AUDITS)
-    assert [row[0] for row in results.rows] == ["take-off", "take-off, paper", "take-off, published file"]
+    results = table([run, as_in_paper(run), published], AUDITS)
+    labels = ["take-off", "take-off, the paper's problem", "take-off, paper", "take-off, published file"]
+    assert [row[0] for row in results.rows] == labels
     assert "fail" in cells(results, "take-off, published file")["verdict"]
     assert table([published], AUDITS).rows[0][0] == "take-off, published file"
 
@@ -94,13 +103,13 @@ def test_every_published_figure_is_of_a_bundled_scenario():
 
 
 def test_a_row_of_which_nothing_is_known_is_left_out(run):
-    jump = replace(run, name="jump")  # of the paper's jump only the solver's figures are known
-    assert [row[0] for row in table([jump], SOLVES).rows] == ["jump", "jump, paper"]
-    assert [row[0] for row in table([jump], AUDITS).rows] == ["jump"]
+    jump = as_in_paper(replace(run, name="jump"))  # of the paper's jump only the solver's figures are known
+    assert [row[0] for row in table([jump], SOLVES).rows] == ["jump, the paper's problem", "jump, paper"]
+    assert [row[0] for row in table([jump], AUDITS).rows] == ["jump, the paper's problem"]
 
 
 def test_the_markdown_has_rows_of_equal_length(run):
-    lines = [line for line in markdown([run]).splitlines() if line.startswith("|")]
+    lines = [line for line in markdown([as_in_paper(run)]).splitlines() if line.startswith("|")]
     assert len(lines) == 2 * (2 + 2)
     assert {line.count("|") for line in lines} == {len(SOLVES) + 2}
     assert len(SOLVES) == len(AUDITS)
@@ -117,6 +126,8 @@ def test_the_command_solves_writes_and_leaves_with_zero_when_all_holds(ironcub, 
         jets=False,
     )
     monkeypatch.setattr(solving, "find", {"take-off": short}.__getitem__)
+    plain = replace(short, margins=mt.scenarios.Margins.none())
+    monkeypatch.setattr(solving, "as_in_paper", {"take-off": plain}.__getitem__)
     for module in (report, reproduce):  # two of the figures, which test_report.py has all of
         monkeypatch.setattr(module, "FIGURES", {name: FIGURES[name] for name in ("forces", "com")})
     arguments = ["reproduce", "take-off", "--output", str(tmp_path), "--published", str(bare)]
@@ -125,9 +136,14 @@ def test_the_command_solves_writes_and_leaves_with_zero_when_all_holds(ironcub, 
     names = {path.name for path in tmp_path.glob("take-off/*")}
     assert names == {"trajectory.npz", "report.html", "forces.png", "com.png"}
     written = (tmp_path / "table.md").read_text(encoding="utf-8")
+    assert {path.name for path in tmp_path.glob("take-off-paper/*")} == names
     assert "| take-off | optimal |" in written
+    assert "| take-off, the paper's problem | optimal |" in written
     assert "| take-off, paper | acceptable | 2976 | 689 |" in written
     assert "| take-off, published file | – |" in written
     assert f"wrote {tmp_path / 'table.md'}" in result.output.replace("\n", "")
     trajectory = mt.Trajectory.load(tmp_path / "take-off" / "trajectory.npz")
     assert mt.audit(ironcub.with_jets(trajectory.jet_names), trajectory).holds
+    assert trajectory.rule == "leapfrog"
+    paper = mt.Trajectory.load(tmp_path / "take-off-paper" / "trajectory.npz")
+    assert (paper.rule, stored(paper)) == ("backward Euler", plain)

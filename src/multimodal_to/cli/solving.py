@@ -189,7 +189,7 @@ def solve(
             autocompletion=completion.linear_solvers,
         ),
     ] = AUTO,
-    paper: Annotated[bool, typer.Option("--paper", help="Solve the paper's own problem, without margins.")] = False,
+    paper: Annotated[bool, typer.Option("--paper", help="Solve the paper's own problem.")] = False,
     warm_start: Annotated[Path | None, typer.Option(help="Trajectory of a similar task to start from.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Try a task that the doctor calls hopeless.")] = False,
     resume: Annotated[Path | None, typer.Option(help="Checkpoint or trajectory to go on from.")] = None,

@@ -48,7 +48,7 @@ class Formulation:
 
     @classmethod
     def paper(cls) -> Formulation:
-        """Return the problem of L'Erario et al. 2022, which `build` takes by default."""
+        """Return the problem of L'Erario et al. 2022, for a scenario of `scenarios.paper`."""
         return cls(terms=paper.TERMS)
 
     @classmethod

@@ -54,10 +54,12 @@ def standing_posture(robot: Robot, surface: Surface, com: Vector3) -> Posture:
 def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float) -> Posture | None:
     """Return the standing posture with the base turned from home by at most `tilt_max` [rad] about each axis, if any.
 
-    Variables: position of the base, its rotation vector from home in world axes, joints.
+    Variables: position of the base, its rotation vector from home in world axes, joints. The search is a local one, and
+    the feet's places may lead it astray; where they do, it starts again from a posture that leaves them out.
     """
     tree, home, limits, count = robot.kindyn.tree, robot.home, robot.joint_limits, len(robot.joint_names)
     position, tilt, joints = cs.SX.sym("p", 3), cs.SX.sym("tilt", 3), cs.SX.sym("s", count)
+    weight = cs.SX.sym("weight")
     orientation = quaternion.product(quaternion.exp(tilt), cs.DM(home.base_quaternion_xyzw))
     base = Pose(quaternion.rotation_matrix(orientation), position)
     points = [forward_kinematics(tree, tree.frame(name), base, joints).translation for name in robot.contact_names]
@@ -69,22 +71,32 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
     )
     problem = {
         "x": cs.vertcat(position, tilt, joints),
-        "f": cs.sumsqr(joints - home.joint_positions) + cs.sumsqr(tilt) + PLACES_WEIGHT * cs.sumsqr(moved),
+        "p": weight,
+        "f": cs.sumsqr(joints - home.joint_positions) + cs.sumsqr(tilt) + weight * cs.sumsqr(moved),
         "g": cs.vertcat(centroidal.com_position(tree, base, joints), *heights),
     }
     options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}}
     solver = cs.nlpsol("standing_posture", "ipopt", problem, options)
-    there = com - at_home
-    result = solver(
-        x0=np.concatenate([home.base_position + there, np.zeros(3), home.joint_positions]),
-        lbx=np.concatenate([np.full(3, -np.inf), np.full(3, -tilt_max), limits.lower]),
-        ubx=np.concatenate([np.full(3, np.inf), np.full(3, tilt_max), limits.upper]),
-        lbg=np.concatenate([com, np.zeros(len(heights))]),
-        ubg=np.concatenate([com, np.full(len(heights), _CONTACT_TOLERANCE)]),
-    )
-    if not solver.stats()["success"]:
-        return None
-    values = np.array(result["x"]).ravel()
+
+    def searched(start: Array, places_weight: float) -> Array | None:
+        result = solver(
+            x0=start,
+            p=places_weight,
+            lbx=np.concatenate([np.full(3, -np.inf), np.full(3, -tilt_max), limits.lower]),
+            ubx=np.concatenate([np.full(3, np.inf), np.full(3, tilt_max), limits.upper]),
+            lbg=np.concatenate([com, np.zeros(len(heights))]),
+            ubg=np.concatenate([com, np.full(len(heights), _CONTACT_TOLERANCE)]),
+        )
+        return np.array(result["x"]).ravel() if solver.stats()["success"] else None
+
+    lifted = np.concatenate([home.base_position + com - at_home, np.zeros(3), home.joint_positions])
+    values = searched(lifted, PLACES_WEIGHT)
+    if values is None:
+        values = searched(lifted, 0.0)
+        if values is None:
+            return None
+        nearer = searched(values, PLACES_WEIGHT)
+        values = values if nearer is None else nearer
     turned = cs.Function("turned", [tilt], [orientation])(values[3:6])
     return Posture(
         base_position=values[:3],

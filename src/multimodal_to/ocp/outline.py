@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 from multimodal_to.errors import FormulationError, ScenarioError, listed
@@ -103,8 +104,12 @@ def _standing(robot: Robot, scenario: Scenario) -> Posture:
 
 
 def _target(robot: Robot, scenario: Scenario, standing: Posture) -> Posture:
-    """Return the posture that posture costs pull to: where a motion ends standing elsewhere, that of the end."""
+    """Return the posture that posture costs pull to: where a motion ends standing elsewhere, that of the end.
+
+    An end at which no posture is found is no error here: a solver may find one, or say what gives way.
+    """
     stands = scenario.start is Start.STANDING and scenario.terminal is Terminal.STANDING
     if stands and scenario.initial_com != scenario.final_com:
-        return standing_posture(robot, scenario.surface, scenario.final_com)
+        with suppress(ScenarioError):
+            return standing_posture(robot, scenario.surface, scenario.final_com)
     return standing

@@ -267,7 +267,14 @@ def running(
     *charged: Where,
     scale: float = 1.0,
 ) -> Cost:
-    """Return a cost that is charged per second."""
+    """Return a cost that is charged per second, with the scenario's weight of the residual's name.
+
+    Args:
+        residual: of a knot or of an interval.
+        unit: of its rows, or of each.
+        charged: where; by default at every knot but the first.
+        scale: its usual size, in its unit.
+    """
     name = residual.__name__
     places = charged or (Where.LATER_KNOTS,)
     return Cost(residual=residual, weight=weight_of(name), unit=unit, charged=places, scale=scale)
