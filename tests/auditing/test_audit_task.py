@@ -137,10 +137,15 @@ def test_thrusts_that_follow_their_dynamics_closely_are_not_off_and_those_that_d
     assert horizon.knot == 7
 
 
-def test_backward_euler_is_off_by_a_few_newtons(ironcub, take_off):
-    interval, horizon = thrust_findings(ironcub, take_off.trajectory)
+def test_backward_euler_is_off_by_a_few_newtons_and_leapfrog_by_tenths(ironcub, take_off, once):
+    paper = mt.scenarios.paper("take-off"), mt.Formulation.paper()
+    plain = once("paper take-off", lambda: mt.solve(mt.build(ironcub, *paper)))
+    interval, horizon = thrust_findings(ironcub, plain.trajectory)
     assert 0.1 < interval.worst < 3.0
     assert interval.worst < horizon.worst < 10.0
+    better, best = thrust_findings(ironcub, take_off.trajectory)
+    assert better.worst < 0.1 * interval.worst
+    assert best.worst < 0.1 * horizon.worst
 
 
 def test_thrusts_that_run_away_are_infinitely_off_and_a_robot_without_jets_has_none(ironcub, take_off):

@@ -276,7 +276,7 @@ OF_THE_IRONCUB = {
     "thrust off CVODES, interval": 5.0,
     "thrust off CVODES, horizon": 5.0,
     "touch-down speed": 0.04 * 2.378,
-    "gliding speed": 0.0476,
+    "gliding speed": 0.0713,
     "start: force balance": 1e-2,
     "end: moment balance": 1e-2,
 }

@@ -136,7 +136,7 @@ def test_a_force_that_alternates_from_knot_to_knot_moves_the_body(tmp_path):
 PAPER = mt.Formulation.paper()
 BY_LEAPFROG = replace(PAPER, rule=LEAPFROG, terms=(*paper.TERMS, *paper.LEAPFROG))
 """The paper's problem by the other rule."""
-TOUCH_DOWN = replace(mt.scenarios.landing(), knots=35, interval_min=0.2, interval_max=0.2)
+TOUCH_DOWN = replace(mt.scenarios.paper("landing"), knots=35, interval_min=0.2, interval_max=0.2)
 
 
 @pytest.fixture(scope="module")
