@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import multimodal_to as mt
 from multimodal_to import scenarios
 from multimodal_to.auditing import PROPERTIES
 from multimodal_to.auditing.audit import audit
