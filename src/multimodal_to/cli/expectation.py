@@ -11,7 +11,7 @@ from multimodal_to.scenarios import SCENARIOS
 from multimodal_to.scenarios.scenario import Scenario
 
 TYPICAL_ITERATIONS: Mapping[str, int] = MappingProxyType(
-    {"take-off": 54, "take-off-and-landing": 190, "landing": 92, "walk-to-fly": 96, "jump": 256, "step-up": 208}
+    {"take-off": 62, "take-off-and-landing": 141, "landing": 98, "walk-to-fly": 110, "jump": 135, "step-up": 175}
 )
 """Iterations of the bundled scenarios, as plans that the robot carries out, in the run that README's table shows."""
 
