@@ -21,7 +21,6 @@ SHORT = {
     "landing": (35, 0.2, 0.2),
     "take_off_and_landing": (80, 0.1, 0.2),
     "walk_to_fly": (50, 0.2, 0.2),
-    "step_up": (40, 0.175, 0.175),
 }
 """Knots and range of the time step [s] of the scenarios in the examples' tests: half as many as in earnest, or less."""
 

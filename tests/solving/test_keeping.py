@@ -262,7 +262,7 @@ def task(tmp_path_factory):
 
 
 def test_a_killed_process_leaves_a_checkpoint_that_is_resumed_beside_it(task, tmp_path):
-    assert kill.killed(tmp_path, 0.2, task)
+    assert kill.killed(tmp_path, 0.0, task)
     resumed = subprocess.run(
         [sys.executable, "-m", "multimodal_to", "solve", "--resume", tmp_path / "checkpoint.npz"],
         capture_output=True,
