@@ -64,27 +64,23 @@ def friction_cone(knot: Knot, parameters: Parameters) -> SX:
 
 def complementarity(knot: Knot, parameters: Parameters) -> SX:
     """d(p_i) n·f_i ≤ ε_n (eq. 20)."""
-    products = [
-        contact.complementarity(parameters.surface, point, force)
-        for point, force in zip(knot.points, knot.forces, strict=True)
-    ]
-    return cs.vertcat(*products)
+    return _lifted_forces(knot.points, knot.forces, parameters)
 
 
 def complementarity_before(interval: Interval, parameters: Parameters) -> SX:
     """d(p_i) n·f_i⁺ ≤ ε_n: a force acts from half an interval before its knot on, when its point stands already."""
-    products = [
-        contact.complementarity(parameters.surface, point, force)
-        for point, force in zip(interval.start.points, interval.end.forces, strict=True)
-    ]
-    return cs.vertcat(*products)
+    return _lifted_forces(interval.start.points, interval.end.forces, parameters)
 
 
 def complementarity_after(interval: Interval, parameters: Parameters) -> SX:
     """d(p_i⁺) n·f_i ≤ ε_n: a force acts until half an interval after its knot, when its point still stands."""
+    return _lifted_forces(interval.end.points, interval.start.forces, parameters)
+
+
+def _lifted_forces(points: list[SX], forces: list[SX], parameters: Parameters) -> SX:
+    """Return height × normal force of each contact point [N m]."""
     products = [
-        contact.complementarity(parameters.surface, point, force)
-        for point, force in zip(interval.end.points, interval.start.forces, strict=True)
+        contact.complementarity(parameters.surface, point, force) for point, force in zip(points, forces, strict=True)
     ]
     return cs.vertcat(*products)
 
