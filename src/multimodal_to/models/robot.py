@@ -90,6 +90,14 @@ class Robot:
         """Return the frames of the contact points."""
         return tuple(contact.frame for contact in self.contacts)
 
+    @cached_property
+    def feet(self) -> Mapping[str, tuple[int, ...]]:
+        """Return the feet by name: which of the contact points each has, in order."""
+        names = dict.fromkeys(contact.foot for contact in self.contacts)
+        return {
+            name: tuple(index for index, contact in enumerate(self.contacts) if contact.foot == name) for name in names
+        }
+
     @property
     def jet_names(self) -> tuple[str, ...]:
         """Return the names of the jets."""

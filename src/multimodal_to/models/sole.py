@@ -52,13 +52,10 @@ def soles(robot: Robot) -> tuple[Sole, ...]:
 
     The middle of a sole is the mean of its corners.
     """
-    feet: dict[str, list[int]] = {}
-    for index, point in enumerate(robot.contacts):
-        feet.setdefault(point.foot, []).append(index)
-    return tuple(sole for foot, members in feet.items() if (sole := _sole(robot, foot, members)) is not None)
+    return tuple(sole for foot, members in robot.feet.items() if (sole := _sole(robot, foot, members)) is not None)
 
 
-def _sole(robot: Robot, foot: str, members: list[int]) -> Sole | None:
+def _sole(robot: Robot, foot: str, members: tuple[int, ...]) -> Sole | None:
     frames = [robot.kindyn.tree.frame(robot.contacts[index].frame) for index in members]
     if len(members) < 3 or len({frame.body for frame in frames}) > 1:
         return None
@@ -70,7 +67,7 @@ def _sole(robot: Robot, foot: str, members: list[int]) -> Sole | None:
     places = (points - middle) @ axes[:2].T
     corners = _hull(places)
     places = places - places[list(corners)].mean(axis=0)
-    return Sole(foot=foot, members=tuple(members), places=places, corners=corners)
+    return Sole(foot=foot, members=members, places=places, corners=corners)
 
 
 def _hull(places: Array) -> tuple[int, ...]:

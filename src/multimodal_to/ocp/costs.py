@@ -92,12 +92,10 @@ def joint_accelerations(interval: Interval, parameters: Parameters) -> SX:
 
 def foot_tilt(knot: Knot, parameters: Parameters) -> SX:
     """d(p_i) less the mean of the foot's points, over L: zero for a sole that is level with the ground."""
-    feet = [contact.foot for contact in knot.robot.contacts]
-    heights = [parameters.surface.distance(point) for point in knot.points]
-    means = {
-        foot: sum(d for d, name in zip(heights, feet, strict=True) if name == foot) / feet.count(foot) for foot in feet
-    }
-    rows = [(d - means[foot]) / knot.robot.standing_height for d, foot in zip(heights, feet, strict=True)]
+    rows = []
+    for members in knot.robot.feet.values():
+        heights = cs.vertcat(*(parameters.surface.distance(knot.points[index]) for index in members))
+        rows.append((heights - cs.sum1(heights) / len(members)) / knot.robot.standing_height)
     return cs.vertcat(cs.SX(0, 1), *rows)
 
 

@@ -38,12 +38,12 @@ def plot_contacts(robot: Robot, *trajectories: Trajectory, labels: Sequence[str]
     rows = max(len(robot.contacts) * len(runs), 1)
     figure = new_figure(runs, "contacts", (8.0, 5.2 + 0.22 * rows))
     timeline, force, height = figure.subplots(3, 1, sharex=True, height_ratios=[0.9 + 0.22 * rows, 2.0, 2.0])
-    feet = list(dict.fromkeys(contact.foot for contact in robot.contacts))
+    feet = list(robot.feet)
     _draw_timeline(timeline, runs, feet)
     for number, run in enumerate(runs):
         forces, heights = (run.trajectory.per_contact(name)[:, 2] for name in ("contact_forces", "contact_positions"))
         for foot, colour in zip(feet, COLOURS, strict=False):
-            members = [index for index, contact in enumerate(run.robot.contacts) if contact.foot == foot]
+            members = list(run.robot.feet[foot])
             label = f"{foot} foot" if number == 0 else None
             look = {"color": colour, "linestyle": run.style}
             draw_row(force, run, forces[members].sum(axis=0), "contact_forces", label=label, **look)

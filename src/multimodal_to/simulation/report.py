@@ -137,9 +137,8 @@ def _rotations(qpos: Array) -> Array:
 def _switches(playback: Playback) -> tuple[Switch, ...]:
     """Return every planned touch-down and lift-off with the simulated one of the same kind that is nearest in time."""
     found, touching = [], loaded_force(playback.robot)
-    feet = dict.fromkeys(contact.foot for contact in playback.robot.contacts)
-    for foot in feet:
-        own = [index for index, contact in enumerate(playback.robot.contacts) if contact.foot == foot]
+    for foot, members in playback.robot.feet.items():
+        own = list(members)
         times = playback.time
         planned = _edges(times, playback.reference.contact_forces[:, own, 2].sum(axis=1) > touching)
         simulated = _edges(times, np.linalg.norm(playback.contact_forces[:, own].sum(axis=1), axis=1) > touching)

@@ -213,8 +213,8 @@ def footsteps(robot: Robot, trajectory: Trajectory, surface: Surface) -> list[Fo
     loaded = normal > loaded_force(robot)
     steps, least_length, least_lift = [], step_length(robot), step_lift(robot)
     begins, ends = _bounds_of_columns(trajectory)
-    for foot in dict.fromkeys(contact.foot for contact in robot.contacts):
-        members = [index for index, contact in enumerate(robot.contacts) if contact.foot == foot]
+    for foot, own in robot.feet.items():
+        members = list(own)
         lowest, middle = heights[members].min(axis=0), points[members].mean(axis=0)[:, :2]
         stands = np.flatnonzero(loaded[members].any(axis=0))
         for before, after in itertools.pairwise(stands):
