@@ -25,7 +25,7 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.scenarios.data import stored
 from multimodal_to.scenarios.scenario import Scenario
-from multimodal_to.trajectory import Trajectory, rules
+from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import (
     at_knots,
     at_velocities,
@@ -35,6 +35,7 @@ from multimodal_to.trajectory.derived import (
     greatest_while_acting,
     loaded_force,
     surface_frames,
+    without_acceleration,
 )
 from multimodal_to.trajectory.sameness import refuse_other_robot
 
@@ -210,7 +211,7 @@ def _followed(values: Array, trajectory: Trajectory) -> Array:
     Where velocities are in the middles of intervals, none follows the last knot. Whether a motion rests there is what
     its task asks.
     """
-    return values[..., :-1] if rules.instant(trajectory.rule, "com_velocity") else values
+    return values[..., :-1] if without_acceleration(trajectory) else values
 
 
 def _torques(motion: Motion) -> list[Worst]:

@@ -16,6 +16,7 @@ No motion like this is stable without a controller. So the state starts again fr
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -69,8 +70,7 @@ def natural_time(robot: Robot) -> float:
 
     Without gravity it is that under 9.81 m/s².
     """
-    gravity = float(np.linalg.norm(robot.gravity)) or 9.81
-    return float(np.sqrt(robot.standing_height / gravity))
+    return 1.0 / (robot.rate_unit or math.sqrt(9.81 / robot.standing_height))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

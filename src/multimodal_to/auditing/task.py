@@ -8,8 +8,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Motion, Worst, worst_of
 from multimodal_to.models.terrain import frame_function
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
-from multimodal_to.trajectory import rules
-from multimodal_to.trajectory.derived import at_knots
+from multimodal_to.trajectory.derived import at_knots, without_acceleration
 
 _SPEEDS = ("com_velocity", "base_linear_velocity", "base_angular_velocity", "joint_velocities")
 
@@ -36,7 +35,7 @@ def _end(motion: Motion, scenario: Scenario) -> list[Worst]:
     if scenario.terminal is Terminal.STANDING:
         findings += _standing("end", motion, last, scenario)
     if scenario.terminal is Terminal.HOVER:
-        known = last - bool(rules.instant(motion.trajectory.rule, "com_velocity"))  # no interval follows the last knot
+        known = last + without_acceleration(motion.trajectory)  # the last knot, or the one before it
         findings += [*_hover("end", motion, last), *_equilibrium("end", motion, known)]
     return findings
 

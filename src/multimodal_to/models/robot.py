@@ -375,8 +375,13 @@ def _plume(entry: JetTable, file: RobotFile, kindyn: KinDynComputations, home: P
 
 
 def _standing_height(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> float:
-    contacts = _offsets(kindyn, home, [frame for frames in file.contact.feet.values() for frame in frames])
-    return proportions.standing_height(contacts, _offsets(kindyn, home, [jet.frame for jet in file.jet]))
+    return proportions.standing_height(*_from_com(file, kindyn, home))
+
+
+def _from_com(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> tuple[Array, Array]:
+    """Return where contact points and jets are from the CoM at home, in world axes [m], (count, 3) each."""
+    contacts = [frame for frames in file.contact.feet.values() for frame in frames]
+    return _offsets(kindyn, home, contacts), _offsets(kindyn, home, [jet.frame for jet in file.jet])
 
 
 def _proportions(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> tuple[Array, Array, Gait]:
@@ -390,8 +395,7 @@ def _proportions(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> 
     reach, gait = file.reach, file.gait
     if reach.contacts is not None and reach.jets is not None and gait.lift is not None:
         return np.array(reach.contacts), np.array(reach.jets), Gait(lift=gait.lift, swing=gait.swing)
-    contacts = _offsets(kindyn, home, [frame for frames in file.contact.feet.values() for frame in frames])
-    jets = _offsets(kindyn, home, [jet.frame for jet in file.jet])
+    contacts, jets = _from_com(file, kindyn, home)
     height = proportions.standing_height(contacts, jets)
     return (
         proportions.contact_reach(contacts, height) if reach.contacts is None else np.array(reach.contacts),

@@ -9,7 +9,7 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory, rules
-from multimodal_to.trajectory.derived import acting_times, base_poses, joint_torques
+from multimodal_to.trajectory.derived import acting_times, base_poses, joint_torques, without_acceleration
 from multimodal_to.trajectory.resampling import resample
 
 
@@ -66,7 +66,7 @@ def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) 
         return at(getattr(plan, name), times + rules.instant(plan.rule, name) * interval)
 
     torques = joint_torques(robot, plan)
-    if not rules.instant(plan.rule, "joint_velocities"):
+    if without_acceleration(plan) == 0:
         torques[:, 0] = torques[:, 1]  # such a trajectory doesn't tell the accelerations of its first knot
     held = np.minimum(np.searchsorted(acting_times(plan)[1] - plan.time[0], times - 1e-9), plan.knots)
     forces = plan.contact_forces[:, held].T if rules.acts_after(plan.rule) else acting("contact_forces")
