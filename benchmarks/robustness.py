@@ -4,9 +4,9 @@
 
 Every variation changes all of them at once: the target's height by up to ±0.05 m (the jump, which is as high as the
 motors can, by down to −0.05 m); the distance, where there is one, by up to ±0.2 m (the step and the place on it by
-±0.1 m); the friction within 0.25 to 0.6; every mass and inertia by up to ±3 %; every joint of the posture that the robot
-stands near by up to ±0.05 rad, within its range. Each is solved from the plain start guess with default options, and
-audited. One line each, then a table.
+±0.1 m); the friction within 0.25 to 0.6; every mass and inertia by up to ±3 %; every joint of the posture that the
+robot stands near by up to ±0.05 rad, within its range. Each is solved from the plain start guess with default options,
+and audited. One line each, then a table.
 """
 
 from __future__ import annotations
