@@ -55,7 +55,7 @@ class Solution:
     feasible: bool
     unmet: tuple[Violation, ...] = field(repr=False)  # terms and bounds that are not met, the worst first
     solve_time: float  # wall time in the solver [s]
-    statistics: dict[str, Any] = field(repr=False)  # the solver's own, `compiled`, `threads` and `versions`
+    statistics: dict[str, Any] = field(repr=False)  # the solver's own, `taped`, `threads` and `versions`
 
     @property
     def largest_violation(self) -> tuple[str, float, str]:
@@ -145,7 +145,7 @@ def _environment(problem: Problem, solver: Solver) -> dict[str, Any]:
         "solver": type(solver).__name__,
         **solver.facts,
         "formulation": problem.formulation.described(),
-        "compiled": problem.nlp.compiled,
+        "taped": problem.nlp.taped,
         "threads": threads,
         "versions": machine.versions(),
     }
