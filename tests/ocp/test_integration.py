@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import casadi as cs
 import numpy as np
@@ -13,7 +13,7 @@ from drones import drone
 from multimodal_to.adam import quaternion
 from multimodal_to.ocp import constraints, paper
 from multimodal_to.ocp.integration import BACKWARD_EULER, LEAPFROG, Interval
-from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.knot import VARIABLE_NAMES, Knot
 from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.resampling import regrid, resample
 
@@ -49,7 +49,7 @@ def knot(robot, **values):
     sizes |= dict.fromkeys(("joint_positions", "joint_velocities"), len(robot.joint_names))
     sizes |= {"contact_forces": sizes["contact_positions"]}
     sizes |= dict.fromkeys(("thrust", "thrust_rate", "throttle"), len(robot.jets))
-    zeros = {entry.name: cs.SX.zeros(sizes.get(entry.name, 3)) for entry in fields(Knot) if entry.name != "robot"}
+    zeros = {name: cs.SX.zeros(sizes.get(name, 3)) for name in VARIABLE_NAMES}
     return Knot(robot, **(zeros | values))
 
 

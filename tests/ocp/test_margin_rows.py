@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import casadi as cs
@@ -24,7 +24,6 @@ from multimodal_to.scenarios import Margins
 from multimodal_to.trajectory.derived import largest_torques
 from solo import solo
 
-NAMES = [entry.name for entry in fields(Knot) if entry.name != "robot"]
 ROWS_OF = {
     "torque": "joint_torques",
     "pressure": "centre_of_pressure",
@@ -49,7 +48,7 @@ def knot_at_home(robot, raised=0.0, **changes):
     values["base_quaternion_xyzw"] = robot.home.base_quaternion_xyzw
     values["joint_positions"] = robot.home.joint_positions
     values["contact_positions"] = contact_positions(robot, robot.home) + np.tile(lift, len(robot.contacts))
-    return Knot(robot, **{name: cs.SX(cs.DM(values[name])) for name in NAMES} | _columns(changes))
+    return Knot(robot, **{name: cs.SX(cs.DM(values[name])) for name in layout.rows} | _columns(changes))
 
 
 def _columns(changes):

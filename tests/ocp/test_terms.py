@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import casadi as cs
 import numpy as np
@@ -13,7 +13,7 @@ import multimodal_to as mt
 from drones import drone
 from multimodal_to.errors import FormulationError
 from multimodal_to.ocp import BackwardEuler, Variable, margins, paper
-from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.knot import VARIABLE_NAMES
 from multimodal_to.trajectory.derived import frame_poses
 
 SQUAT = replace(
@@ -481,7 +481,7 @@ class Midpoint:
         return (quantity(start) + quantity(end)) / 2.0
 
     def at_accelerations(self, start, end):
-        names = [entry.name for entry in fields(Knot) if entry.name != "robot"]
+        names = VARIABLE_NAMES
         return replace(end, **{name: 0.5 * (getattr(start, name) + getattr(end, name)) for name in names})
 
     def at_velocities(self, end, duration):

@@ -32,12 +32,13 @@ def angular_momentum_kinematics(interval: Interval, parameters: Parameters) -> S
     """
     knot = interval.at_velocities
     base = knot.base
-    turning = base.rotation.T @ knot.base_angular_velocity
+    turning = knot.lift(base.rotation.T @ knot.base_angular_velocity)
     momentum, _ = rigid_body.momentum_in_base(
         knot.robot.kindyn.tree, knot.joint_positions, turning, knot.joint_velocities
     )
+    linear, angular = cs.vertsplit(knot.lift(cs.vertcat(momentum.linear, momentum.angular)), 3)
     arm = knot.com_position - knot.base_position
-    about_com = base.rotation @ momentum.angular - cs.cross(arm, base.rotation @ momentum.linear)
+    about_com = base.rotation @ angular - cs.cross(arm, base.rotation @ linear)
     return knot.angular_momentum - about_com
 
 

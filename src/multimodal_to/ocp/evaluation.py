@@ -223,9 +223,7 @@ class Evaluation(cs.Callback):  # type: ignore[misc]
             if vector is not None
             for some in output.entries
         }
-        return [
-            block.values(inputs) if block in asked and block.tape is None else None for block in self._blocks
-        ]
+        return [block.values(inputs) if block in asked and block.tape is None else None for block in self._blocks]
 
     def _add_up(self, values: Sequence[Array | None] | None, vectors: Sequence[Array | None]) -> None:
         flat = np.zeros(self._count)

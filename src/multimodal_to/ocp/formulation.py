@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 from multimodal_to.errors import FormulationError, listed, shown, unknown
 from multimodal_to.ocp import margins, paper
 from multimodal_to.ocp.integration import BACKWARD_EULER, LEAPFROG, IntegrationRule
-from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.knot import VARIABLE_NAMES
 from multimodal_to.ocp.terms import Constraint, Cost, Term
 from multimodal_to.ocp.variables import INTERVAL_SCALE, VARIABLES, Variable
 from multimodal_to.trajectory import rules
-
-_NEEDED = tuple(entry.name for entry in fields(Knot) if entry.name != "robot")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,10 +37,10 @@ class Formulation:
             counts = Counter(entry.name for entry in entries)
             if twice := [name for name, count in counts.items() if count > 1]:
                 raise FormulationError(f"the {kind} name {listed(twice)} is taken already; expected each name once")
-        if missing := [name for name in _NEEDED if name not in {variable.name for variable in self.variables}]:
+        if missing := [name for name in VARIABLE_NAMES if name not in {variable.name for variable in self.variables}]:
             raise FormulationError(f"the formulation lacks the variables {listed(missing)}")
-        if extra := [variable.name for variable in self.variables if variable.name not in _NEEDED]:
-            raise FormulationError(f"{listed(extra)} cannot be variables; expected {listed(_NEEDED)}")
+        if extra := [variable.name for variable in self.variables if variable.name not in VARIABLE_NAMES]:
+            raise FormulationError(f"{listed(extra)} cannot be variables; expected {listed(VARIABLE_NAMES)}")
         if not 0 < self.interval_scale < math.inf:
             raise FormulationError(f"interval_scale is {self.interval_scale}; expected a positive number [s]")
 

@@ -130,8 +130,8 @@ class Leapfrog:
             end,
             com_position=end.com_position - half * end.com_velocity,
             base_position=end.base_position - half * end.base_linear_velocity,
-            base_quaternion_xyzw=quaternion.product(turn, end.base_quaternion_xyzw),
-            joint_positions=end.joint_positions - half * end.joint_velocities,
+            base_quaternion_xyzw=end.lift(quaternion.product(turn, end.base_quaternion_xyzw)),
+            joint_positions=end.lift(end.joint_positions - half * end.joint_velocities),
         )
 
 
@@ -147,7 +147,7 @@ class Interval:
     duration: SX  # Δt [s], (1, 1)
     rule: IntegrationRule
 
-    @property
+    @cached_property
     def at_velocities(self) -> Knot:
         """Return the configuration at the instant of the velocities that the interval's end holds."""
         return self.rule.at_velocities(self.end, self.duration)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import casadi as cs
@@ -12,6 +12,7 @@ from multimodal_to.adam.kinematics import Pose, forward_kinematics
 from multimodal_to.adam.spatial import SX
 from multimodal_to.models.centroidal import momentum_rate, thrust_force
 from multimodal_to.models.robot import Robot
+from multimodal_to.ocp.lifting import Lift, not_lifted
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Knot:
     thrust: SX  # T [N], (jets, 1)
     thrust_rate: SX  # Ṫ [N/s], (jets, 1)
     throttle: SX  # u [%], (jets, 1)
+    lift: Lift = not_lifted  # for a quantity through which many variables act
 
     @cached_property
     def base(self) -> Pose:
@@ -74,3 +76,7 @@ class Knot:
     def forces(self) -> list[SX]:
         """Return the contact forces [N], (3, 1) each."""
         return cs.vertsplit(self.contact_forces, 3) if self.robot.contacts else []
+
+
+VARIABLE_NAMES = tuple(entry.name for entry in fields(Knot) if entry.name not in ("robot", "lift"))
+"""The names of the variables of a knot."""

@@ -12,6 +12,7 @@ import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
+from multimodal_to.adam.kinematics import Pose, forward_kinematics
 from multimodal_to.adam.rnea import inverse_dynamics
 from multimodal_to.adam.spatial import SX
 from multimodal_to.models import contact
@@ -33,23 +34,29 @@ def generalised_forces(interval: Interval) -> SX:
     belong together.
     """
     knot, tree = interval.at_accelerations, interval.end.robot.kindyn.tree
+    lift, rotation = knot.lift, knot.base.rotation
+    forces = [lift(rotation.T @ force) for force in knot.forces]
     wrenches = {
-        name: cs.vertcat(force, cs.SX(3, 1)) for name, force in zip(knot.robot.contact_names, knot.forces, strict=True)
+        name: cs.vertcat(force, cs.SX(3, 1)) for name, force in zip(knot.robot.contact_names, forces, strict=True)
     }
+    base = Pose(cs.SX(cs.DM.eye(3)), cs.SX(3, 1))  # all of it is in its axes
     for index, jet in enumerate(knot.robot.jets):
-        force = thrust_force(knot.pose(jet.frame).rotation, knot.thrust[index])
-        wrenches[jet.frame] = cs.vertcat(force, cs.SX(3, 1))
-    return inverse_dynamics(
+        nozzle = forward_kinematics(tree, tree.frame(jet.frame), base, knot.joint_positions)
+        wrenches[jet.frame] = cs.vertcat(thrust_force(nozzle.rotation, knot.thrust[index]), cs.SX(3, 1))
+    acceleration = interval.rate(lambda knot: knot.base_linear_velocity) - cs.DM(knot.robot.gravity)
+    turning = interval.rate(lambda knot: knot.base_angular_velocity)
+    in_base = inverse_dynamics(
         tree,
-        knot.base,
+        base,
         knot.joint_positions,
-        cs.vertcat(knot.base_linear_velocity, knot.base_angular_velocity),
-        knot.joint_velocities,
-        interval.rate(lambda knot: cs.vertcat(knot.base_linear_velocity, knot.base_angular_velocity)),
-        interval.rate(lambda knot: knot.joint_velocities),
-        cs.DM(knot.robot.gravity),
+        cs.vertcat(cs.SX(3, 1), lift(rotation.T @ knot.base_angular_velocity)),
+        lift(knot.joint_velocities),
+        cs.vertcat(lift(rotation.T @ acceleration), lift(rotation.T @ turning)),
+        lift(interval.rate(lambda knot: knot.joint_velocities)),
+        cs.SX(3, 1),
         wrenches,
     )
+    return cs.vertcat(rotation @ in_base[:3], rotation @ in_base[3:6], in_base[6:])
 
 
 def limited_joints(robot: Robot) -> NDArray[np.intp]:

@@ -13,6 +13,7 @@ from multimodal_to.adam.spatial import SX
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.lifting import Lifted
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import Constraint, Cost, Rows, Where
 from multimodal_to.ocp.transcription import Stage
@@ -75,7 +76,8 @@ def collect(
     """
     knots = parameters.scenario.knots
     z, z_next, dt = cs.SX.sym("z", layout.size), cs.SX.sym("z_next", layout.size), cs.SX.sym("dt")
-    start, end = (Knot(parameters.robot, **layout.read(values * layout.scale)) for values in (z, z_next))
+    lifted = Lifted()
+    start, end = (Knot(parameters.robot, **layout.read(values * layout.scale), lift=lifted) for values in (z, z_next))
     duration = dt * formulation.interval_scale
     interval = Interval(start, end, duration, formulation.rule)
     first, every, last = np.array([0]), np.arange(knots), np.array([knots - 1])
@@ -122,8 +124,9 @@ def collect(
                     start=z,
                     end=z_next,
                     interval=dt,
-                    families=tuple(some.expression / some.scale for _, some in rows),
-                    costs=cs.vertcat(cs.SX(0, 1), *charged.values()),
+                    lifted_families=tuple(some.expression / some.scale for _, some in rows),
+                    lifted_costs=cs.vertcat(cs.SX(0, 1), *charged.values()),
+                    lifted=lifted,
                 ),
                 rows=rows,
                 knots=place.knots,

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import SX
 from multimodal_to.ocp.evaluation import Block, Entries, Evaluation, Output, mapped
+from multimodal_to.ocp.lifting import Lifted
 
 Integers = NDArray[np.int64]
-
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,17 +30,30 @@ class Stage:
     start: SX  # z_k, (size, 1)
     end: SX  # z_k+1, (size, 1)
     interval: SX  # Δt, (1, 1)
-    families: tuple[SX, ...]  # the rows by name, (m_i, 1) each, scaled
-    costs: SX  # (c, 1), one per name, weighted
+    lifted_families: tuple[SX, ...]  # the rows by name, (m_i, 1) each, scaled; they may hold symbols of `lifted`
+    lifted_costs: SX  # (c, 1), one per name, weighted; likewise
+    lifted: Lifted
 
     @cached_property
     def _arguments(self) -> SX:
         return cs.vertcat(self.start, self.end, self.interval)
 
     @cached_property
+    def families(self) -> tuple[SX, ...]:
+        """Return the rows by name, (m_i, 1) each."""
+        return tuple(
+            cs.vertsplit(self.rows, [0, *np.cumsum([some.shape[0] for some in self.lifted_families]).tolist()])
+        )
+
+    @cached_property
     def rows(self) -> SX:
         """Return all rows, (m, 1)."""
-        return cs.vertcat(cs.SX(0, 1), *self.families)
+        return self.lifted.expand(cs.vertcat(cs.SX(0, 1), *self.lifted_families))
+
+    @cached_property
+    def costs(self) -> SX:
+        """Return the costs by name, (c, 1)."""
+        return self.lifted.expand(self.lifted_costs)
 
     @property
     def repeats(self) -> int:
@@ -96,14 +109,15 @@ class Stage:
     def hessian(self) -> tuple[cs.Function, cs.Sparsity]:
         """Return (z, z⁺, Δt, σ, λ) → nonzeros of the upper Hessian of σ Σ costs + λᵀ rows, and their places."""
         sigma, multipliers = cs.SX.sym("sigma"), cs.SX.sym("lambda", self.rows.shape[0])
-        lagrangian = sigma * cs.sum1(self.costs) + cs.dot(multipliers, self.rows)
-        upper = cs.triu(cs.hessian(lagrangian, self._arguments)[0])
+        rows = cs.vertcat(cs.SX(0, 1), *self.lifted_families)
+        lagrangian = sigma * cs.sum1(self.lifted_costs) + cs.dot(multipliers, rows)
+        upper = self.lifted.hessian(lagrangian, self._arguments)
         return self._nonzeros("hessian", upper, sigma, multipliers)
 
     def cost_hessian(self) -> tuple[cs.Function, cs.Sparsity]:
         """Return (z, z⁺, Δt, σ) → nonzeros of the upper Hessian of σ Σ costs alone, and their places."""
         sigma = cs.SX.sym("sigma")
-        upper = cs.triu(cs.hessian(sigma * cs.sum1(self.costs), self._arguments)[0])
+        upper = self.lifted.hessian(sigma * cs.sum1(self.lifted_costs), self._arguments)
         return self._nonzeros("cost_hessian", upper, sigma)
 
     def _nonzeros(self, kind: str, matrix: SX, *more: SX) -> tuple[cs.Function, cs.Sparsity]:

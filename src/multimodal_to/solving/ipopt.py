@@ -199,9 +199,7 @@ def _run(problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Wa
     functions = {"x": symbol, "f": nlp.objective(symbol), "g": nlp.rows(symbol)}
     try:
         solver = cs.nlpsol("solver", "ipopt", functions, options)  # goes with its memory when this solve ends
-        ended = solver(
-            x0=x, lbx=problem.lower, ubx=problem.upper, lbg=problem.row_lower, ubg=problem.row_upper
-        )
+        ended = solver(x0=x, lbx=problem.lower, ubx=problem.upper, lbg=problem.row_lower, ubg=problem.row_upper)
     except RuntimeError as error:
         raise watcher.error or SolverError(f"the solver did not run: {error}") from error
     if watcher.error is not None:
