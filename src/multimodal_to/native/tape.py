@@ -139,7 +139,7 @@ class Horizon:
         )
 
     def run(
-        self, sources: Sequence[int], results: Sequence[int | None], brought: Sequence[Array | None] | None = None
+        self, sources: Sequence[int | None], results: Sequence[int | None], brought: Sequence[Array | None] | None = None
     ) -> None:
         """Compute results.
 

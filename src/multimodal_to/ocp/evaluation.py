@@ -111,17 +111,17 @@ class _Sum:
             for some, shape in zip(output.entries, shapes, strict=True)
         ]
         value, key = (_flat(each) for each in (values, keys))
-        places, first, index = np.unique(key, return_index=True, return_inverse=True)
-        again = np.setdiff1d(np.arange(key.size), first, assume_unique=True)
-        again = again[np.argsort(index[again], kind="stable")]
+        order = np.argsort(key, kind="stable")
+        new = np.diff(key[order], prepend=-1) > 0
+        places, first, terms = key[order[new]], value[order[new]], value[order[~new]]
+        targets = (np.cumsum(new) - 1)[~new]
         if not output.dense:
             starts = np.searchsorted(places, height * np.arange(width + 1))
             pattern = cs.Sparsity(height, width, starts.tolist(), (places % height).tolist())
-            return cls(pattern=pattern, first=value[first], targets=index[again], terms=value[again])
+            return cls(pattern=pattern, first=first, targets=targets, terms=terms)
         firsts = np.full(height * width, -1)
-        firsts[places] = value[first]
-        pattern = cs.Sparsity.dense(height, width)
-        return cls(pattern=pattern, first=firsts, targets=places[index[again]], terms=value[again])
+        firsts[places] = first
+        return cls(pattern=cs.Sparsity.dense(height, width), first=firsts, targets=places[targets], terms=terms)
 
     def add_up(self, values: Array, out: Array) -> None:
         """Write the sums of values, in the order in which a tape's are added."""
@@ -170,27 +170,35 @@ class Evaluation(cs.Callback):  # type: ignore[misc]
         return all(block.tape is not None for block in self._blocks)
 
     def get_n_in(self) -> int:
+        """Return how many inputs there are; this and the rest is for CasADi."""
         return len(self._inputs)
 
     def get_n_out(self) -> int:
+        """Return how many outputs there are."""
         return len(self._outputs)
 
     def get_name_in(self, index: int) -> str:
+        """Return the name of an input."""
         return tuple(self._inputs)[index]
 
     def get_name_out(self, index: int) -> str:
+        """Return the name of an output."""
         return self._outputs[index].name
 
     def get_sparsity_in(self, index: int) -> cs.Sparsity:
+        """Return the shape of an input, dense."""
         return cs.Sparsity.dense(tuple(self._inputs.values())[index], 1)
 
     def get_sparsity_out(self, index: int) -> cs.Sparsity:
+        """Return where an output may be other than zero."""
         return cs.Sparsity.dense(1, 1) if self._outputs[index].total else self._sums[index].pattern
 
     def has_eval_buffer(self) -> bool:
+        """Return that it works on the memory that it is given."""
         return True
 
     def eval_buffer(self, arguments: Sequence[Any], results: Sequence[Any]) -> int:
+        """Compute the outputs that have memory; return 0."""
         inputs = [
             np.frombuffer(given) if size and given is not None else np.zeros(size)
             for given, size in zip(arguments, self._inputs.values(), strict=True)
