@@ -53,7 +53,7 @@ def test_the_environment_leaves_it_unused():
         capture_output=True,
         text=True,
     )
-    assert ended.stdout == "None||the native library is not used, as MULTIMODAL_TO_NATIVE=0 asks\n"
+    assert ended.stdout == "None||MULTIMODAL_TO_NATIVE=0 leaves the native library unused\n"
 
 
 def test_the_environment_names_another_file(tested):

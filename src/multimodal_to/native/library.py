@@ -55,7 +55,7 @@ def opened_as_asked(asked: str) -> tuple[ctypes.CDLL | None, str]:
         asked: `0` for none, a file's path, or nothing for the one that was installed.
     """
     if asked == "0":
-        return None, f"the native library is not used, as {VARIABLE}=0 asks"
+        return None, f"{VARIABLE}=0 leaves the native library unused"
     opened, problem = opened_file(Path(asked) if asked else BESIDE)
     if opened is not None:
         opened.mt_set_threads(default_threads())
