@@ -35,6 +35,7 @@ from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
 from multimodal_to.errors import InputError, ScenarioError
 from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.native import missing
 from multimodal_to.ocp import Formulation, build
 from multimodal_to.ocp.integration import LEAPFROG
 from multimodal_to.scenarios import SCENARIOS, find
@@ -224,9 +225,12 @@ def solve(
     console.print(
         f"{scenario.title}: {the_robot.name}, {scenario.knots} knots, {problem.lower.size} variables, "
         f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s"
-        f"{'' if problem.nlp.taped else ' with derivatives by CasADi'}, linear solver {chosen_solver.name}",
+        f"{'' if problem.nlp.taped or missing() else ' with some functions by CasADi'}, "
+        f"linear solver {chosen_solver.name}",
         soft_wrap=True,
     )
+    if without := missing():
+        console.print(f"warning: the solve takes longer, as {without}", soft_wrap=True)
     expectation = expect(scenario) if task.start is None and not paper else None
     if expectation is not None:
         console.print(f"{expectation}", soft_wrap=True)

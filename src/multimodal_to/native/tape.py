@@ -70,7 +70,7 @@ class Tape:
         self.handle = _native().mt_tape_new(rows.shape[0], rows.ctypes.data, arguments, outputs)
         if not self.handle:
             raise ValueError(f"the {rows.shape[0]} instructions are no tape")
-        weakref.finalize(self, _native().mt_tape_delete, self.handle)
+        _freed(self, "mt_tape_delete", self.handle)
         self.outputs = outputs
 
     @property
@@ -96,7 +96,7 @@ class Horizon:
 
     def __init__(self, results: int) -> None:
         self._handle = _kept(_native().mt_horizon_new(results))
-        weakref.finalize(self, _native().mt_horizon_delete, self._handle)
+        _freed(self, "mt_horizon_delete", self._handle)
         self._tapes: list[Tape | None] = []  # they have to live as long
         self._results = results
 
@@ -158,6 +158,11 @@ class Horizon:
                 self._handle, (_POINTER * len(sources))(*sources), (_POINTER * len(results))(*results), values
             )
         )
+
+
+def _freed(owner: object, function: str, handle: int) -> None:
+    """Free what a handle names when its owner goes; not at the end of the process, where a thread may still use it."""
+    weakref.finalize(owner, getattr(_native(), function), handle).atexit = False
 
 
 def _kept(returned: int | None) -> int:
