@@ -139,7 +139,10 @@ class Horizon:
         )
 
     def run(
-        self, sources: Sequence[int | None], results: Sequence[int | None], brought: Sequence[Array | None] | None = None
+        self,
+        sources: Sequence[int | None],
+        results: Sequence[int | None],
+        brought: Sequence[Array | None] | None = None,
     ) -> None:
         """Compute results.
 

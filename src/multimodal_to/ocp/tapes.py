@@ -51,7 +51,13 @@ def read(function: cs.Function) -> Instructions:
         return np.zeros((0, 4), dtype=np.int32)
     probes = {int(k): _instruction(function, int(k)) for k in np.linspace(0, count - 1, min(_PROBES, count))}
     found = _found(function.serialize(), count, probes)
-    return np.array([_instruction(function, k) for k in range(count)], dtype=np.int32) if found is None else found
+    if found is not None:
+        return found
+    rows = np.zeros((count, 4), dtype=np.int32)
+    for k in range(count):
+        row = _instruction(function, k)
+        rows[k, : len(row)] = row
+    return rows
 
 
 def _found(text: str, count: int, probes: dict[int, tuple[int, ...]]) -> Instructions | None:

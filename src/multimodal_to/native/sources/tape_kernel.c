@@ -117,6 +117,8 @@ OUTPUT: {
   VECTORS(FABS, value_of(bits_of(x) & ~sign_bit()))
   VECTORS(SIGN, choose(x < 0.0, all(-1.0), choose(x > 0.0, all(1.0), x)))
   VECTORS(COPYSIGN, value_of((bits_of(x) & ~sign_bit()) | (bits_of(y) & sign_bit())))
+  VECTORS(FMIN, choose((y < x) | (x != x), y, x)) /* of two zeros the first, of NaN and a number the number */
+  VECTORS(FMAX, choose((y > x) | (x != x), y, x))
   VECTORS(IF_ELSE_ZERO, value_of(~(x == 0.0) & bits_of(y)))
   VECTORS(NOT, truth(x == 0.0))
   VECTORS(AND, truth((x != 0.0) & (y != 0.0)))
@@ -128,8 +130,6 @@ OUTPUT: {
   SCALARS(SQRT, sqrt(u))
   SCALARS(FLOOR, floor(u))
   SCALARS(CEIL, ceil(u))
-  SCALARS(FMIN, fmin(u, v))
-  SCALARS(FMAX, fmax(u, v))
   SCALARS(FMOD, fmod(u, v))
   SCALARS(REMAINDER, remainder(u, v))
   SCALARS(POW, pow(u, v))
