@@ -37,9 +37,7 @@ def test_what_holds_no_symbol_is_derived_as_it_is():
     assert cs.is_equal(lifted.hessian(x[0] ** 3 * x[1], x)[0, 1], expected[0, 1], 20)
 
 
-@pytest.mark.parametrize(
-    ("formulation", "share"), [(mt.Formulation.paper(), 0.9), (mt.Formulation.executable(), 0.75)]
-)
+@pytest.mark.parametrize(("formulation", "share"), [(mt.Formulation.paper(), 0.9), (mt.Formulation.executable(), 0.75)])
 def test_the_hessian_of_a_problem_is_that_of_its_rows_and_costs_without_lifts(ironcub, formulation, share):
     scenario = mt.scenarios.landing()
     robot, standing = prepared(ironcub, scenario)

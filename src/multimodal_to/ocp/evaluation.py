@@ -124,8 +124,8 @@ class _Sum:
         return cls(pattern=cs.Sparsity.dense(height, width), first=firsts, targets=places[targets], terms=terms)
 
     def add_up(self, values: Array, out: Array) -> None:
-        """Write the sums of values, in the order in which a tape's are added."""
-        out[:] = np.where(self.first < 0, 0.0, values[self.first])
+        """Write the sums of values, behind which there is a zero, in the order in which a tape's are added."""
+        out[:] = values[self.first]
         np.add.at(out, self.targets, values[self.terms])
 
 
@@ -153,13 +153,14 @@ class Evaluation(cs.Callback):  # type: ignore[misc]
         self._begins = dict(zip(self._blocks, begins, strict=False))
         self._count = begins[-1]
         self._sums = [_Sum.of(output, self._begins) for output in outputs]
+        self._tapes = [None if library() is None else block.tape for block in self._blocks]
         self._horizon = None if library() is None else self._native()
         self.construct(name, {})
 
     def _native(self) -> Horizon:
         horizon = Horizon(len(self._outputs))
-        for block in self._blocks:
-            horizon.add(block.tape, block.sources, block.offsets, block.outputs)
+        for block, tape in zip(self._blocks, self._tapes, strict=True):
+            horizon.add(tape, block.sources, block.offsets, block.outputs)
         for index, some in enumerate(self._sums):
             horizon.result(index, some.first, some.targets, some.terms)
         return horizon
@@ -167,7 +168,7 @@ class Evaluation(cs.Callback):  # type: ignore[misc]
     @property
     def taped(self) -> bool:
         """Return whether nothing of it is evaluated by CasADi."""
-        return all(block.tape is not None for block in self._blocks)
+        return None not in self._tapes
 
     def get_n_in(self) -> int:
         """Return how many inputs there are; this and the rest is for CasADi."""
@@ -231,10 +232,13 @@ class Evaluation(cs.Callback):  # type: ignore[misc]
             if vector is not None
             for some in output.entries
         }
-        return [block.values(inputs) if block in asked and block.tape is None else None for block in self._blocks]
+        return [
+            block.values(inputs) if tape is None and block in asked else None
+            for block, tape in zip(self._blocks, self._tapes, strict=True)
+        ]
 
     def _add_up(self, values: Sequence[Array | None] | None, vectors: Sequence[Array | None]) -> None:
-        flat = np.zeros(self._count)
+        flat = np.zeros(self._count + 1)
         for block, some in zip(self._blocks, values or (), strict=True):
             if some is not None:
                 flat[self._begins[block] :][: some.size] = some.ravel()
