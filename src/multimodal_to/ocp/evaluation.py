@@ -52,11 +52,18 @@ class Block:
 
     def values(self, inputs: Sequence[Array]) -> Array:
         """Return the values as CasADi computes them, (repeats, outputs)."""
+        values = np.empty((self.repeats, self.outputs))
         columns = [
-            inputs[source][offsets + np.arange(self.function.nnz_in(index))[:, None]]
+            np.ascontiguousarray(inputs[source][offsets[:, None] + np.arange(self.function.nnz_in(index))])
             for index, (source, offsets) in enumerate(zip(self.sources, self.offsets, strict=True))
         ]
-        return np.array(self._mapped(*columns)).T
+        buffer, evaluate = self._mapped.buffer()  # CasADi reads and writes these arrays themselves
+        for index, column in enumerate(columns):
+            if column.size:
+                buffer.set_arg(index, memoryview(column.ravel()))
+        buffer.set_res(0, memoryview(values.ravel()))
+        evaluate()
+        return values
 
 
 def mapped(function: cs.Function, repeats: int) -> cs.Function:
