@@ -39,9 +39,7 @@ typedef struct {
 } making;
 
 /* How many values are put in order together: long enough for long runs, short enough to need few more registers. */
-#ifndef MT_TAPE_WINDOW
-#define MT_TAPE_WINDOW 65536
-#endif
+enum { WINDOW = 65536 };
 
 #define NAME(name) #name,
 static const char *const names[] = {MT_TAPE_OPERATIONS(NAME)};
@@ -222,8 +220,8 @@ static void order_window(making *m, int64_t from, int64_t to) {
 }
 
 static void order_all(making *m) {
-  for (int64_t k = 0; k < m->count; k += MT_TAPE_WINDOW) {
-    order_window(m, k, k + MT_TAPE_WINDOW < m->count ? k + MT_TAPE_WINDOW : m->count);
+  for (int64_t k = 0; k < m->count; k += WINDOW) {
+    order_window(m, k, k + WINDOW < m->count ? k + WINDOW : m->count);
   }
 }
 
@@ -290,7 +288,7 @@ mt_tape *mt_tape_new(int64_t count, const int32_t *read, int64_t arguments, int6
   m.values = malloc((size_t)(count + 1) * sizeof *m.values);
   m.released = malloc((size_t)(count + 1) * sizeof *m.released);
   m.order = malloc((size_t)(count + 1) * sizeof *m.order);
-  m.edges = malloc((size_t)(3 * MT_TAPE_WINDOW) * sizeof *m.edges);
+  m.edges = malloc((size_t)(3 * WINDOW) * sizeof *m.edges);
   m.latest = malloc((size_t)m.room * sizeof *m.latest);
   m.table = malloc((size_t)(m.mask + 1) * sizeof *m.table);
   int made = tape && tape->instructions && tape->constants && m.values && m.released && m.order && m.edges && m.latest && m.table;
