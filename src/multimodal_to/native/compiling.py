@@ -182,7 +182,7 @@ def own_compiler() -> Compiler:
     failures = []
     for command in ([named] if named else []) + usual:
         compiler = _compiler(tuple(command))
-        failure = _failure(compiler)
+        failure = failure_of(compiler)
         if not failure:
             return compiler
         failures.append(f"{compiler.name}: {failure}")
@@ -231,7 +231,7 @@ def _compiler(command: tuple[str, ...], target: str = "") -> Compiler:
     return Compiler(command=command, target=target or native_target())
 
 
-def _failure(compiler: Compiler) -> str:
+def failure_of(compiler: Compiler) -> str:
     """Return why a compiler cannot make a library for this Python; nothing where it makes a tiny one that opens."""
     with tempfile.TemporaryDirectory() as folder:
         source, library = Path(folder, "tiny.c"), Path(folder, library_name())
