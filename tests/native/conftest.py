@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +12,8 @@ from multimodal_to.native import compiling
 
 SOURCES = sorted(Path(__file__).with_name("sources").glob("*.c"))
 """Functions for the tests, beside those of the package."""
-STRICT = ("-Wall", "-Wextra", "-Werror")
+STRICT = ("-Wall", "-Wextra", "-Werror", *os.environ.get("MULTIMODAL_TO_SANITIZED", "").split())
+"""The flags of a sanitizer come from `benchmarks/native.py`."""
 
 
 @pytest.fixture(scope="session")
