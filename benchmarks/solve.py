@@ -6,8 +6,7 @@
 A scenario is the name of a bundled one or a TOML file. A run solves it as the command line does without pictures, in a
 process of its own, and then from Python: built, solved from its plain start guess, and solved again from that answer
 for a target that is 2 cm higher: the height at mid-horizon where the scenario asks for one, otherwise that of the end.
-How an iteration's time is split is that of the last phase, the exact one. Where there is a C compiler, the derivatives
-are compiled at the end, into a folder of this run, and the first solve is repeated with them.
+How an iteration's time is split is that of the last phase, the exact one.
 
 * `--tight` goes on from an answer with a hundredth of the tolerance: how far its objective is above the converged one.
 * `--reference` runs `paper_reference.py` too, for the scenarios that it has or those of `--reference-of`: `full` to its
@@ -32,16 +31,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import multimodal_to as mt
-from multimodal_to.ocp import compiled
 from multimodal_to.scenarios.files import load
 from multimodal_to.solving.machine import versions
 
@@ -91,14 +87,6 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3  # Linux counts in kB
 
 
-@contextmanager
-def empty_cache() -> Iterator[None]:
-    """Let this process and its children find no compiled functions but their own."""
-    with tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, {compiled.CACHE_VARIABLE: folder}):
-        yield
-
-
-@empty_cache()
 def command(name: str) -> Figures:
     """Run the whole command without pictures; it must end with an answer."""
     with tempfile.TemporaryDirectory() as folder:
@@ -111,9 +99,8 @@ def command(name: str) -> Figures:
     return {"command, cold [s]": spent, "command, peak memory [MB]": peak, "command has an answer": solved}
 
 
-@empty_cache()
 def library(name: str) -> Figures:
-    """Build, solve, solve again from the answer, and solve with compiled derivatives, in this process."""
+    """Build, solve and solve again from the answer, in this process."""
     robot, scenario = mt.load_robot("ironcub"), scenario_of(name)
     started = time.perf_counter()
     problem = mt.build(robot, scenario, mt.Formulation.paper())
@@ -136,28 +123,6 @@ def library(name: str) -> Figures:
         "warm iterations": warm.iterations,
         "warm status": warm.status.value,
         **{f"warm {key}": value for key, value in judged(warm_problem, warm).items()},
-        **with_compiled(robot, scenario),
-    }
-
-
-def with_compiled(robot: mt.Robot, scenario: mt.Scenario) -> Figures:
-    """Compile the derivatives, build with them and solve."""
-    started = time.perf_counter()
-    try:
-        mt.precompile(robot, scenario, mt.Formulation.paper())
-    except mt.MultimodalError as error:
-        return {"compiled": str(error)}
-    spent = time.perf_counter() - started
-    started = time.perf_counter()
-    problem = mt.build(robot, scenario, mt.Formulation.paper())
-    built = time.perf_counter() - started
-    solution = mt.solve(problem)
-    return {
-        "compiling [s]": spent,
-        "compiled build [s]": built,
-        "compiled solve [s]": solution.solve_time,
-        "compiled iterations": solution.iterations,
-        "compiled objective": solution.objective,
     }
 
 
@@ -172,7 +137,6 @@ def judged(problem: mt.Problem, solution: mt.Solution) -> Figures:
     }
 
 
-@empty_cache()
 def tight(name: str) -> Figures:
     """Solve, go on from the answer with a smaller tolerance, and compare the objectives."""
     problem = mt.build(mt.load_robot("ironcub"), scenario_of(name), mt.Formulation.paper())
@@ -193,7 +157,6 @@ def on_grid(scenario: mt.Scenario, knots: int) -> mt.Scenario:
     )
 
 
-@empty_cache()
 def growth(knots: str) -> Figures:
     """Iterate the take-off on a grid of so many knots."""
     scenario = on_grid(mt.scenarios.take_off(), int(knots))

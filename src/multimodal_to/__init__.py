@@ -27,7 +27,6 @@ from multimodal_to.ocp import (
     between,
     build,
     equal,
-    precompile,
 )
 from multimodal_to.scenarios import Margins, Scenario, Start, Terminal, Weights
 from multimodal_to.scenarios import files as scenario_files
@@ -74,7 +73,6 @@ __all__ = [
     "doctor",
     "equal",
     "load_robot",
-    "precompile",
     "relax",
     "scenario_files",
     "scenarios",

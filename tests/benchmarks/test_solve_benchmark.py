@@ -9,7 +9,6 @@ import pytest
 
 import multimodal_to as mt
 import solve
-from multimodal_to.ocp import compiled
 from multimodal_to.scenarios.files import to_toml
 
 PAGE = Path(__file__).parents[2] / "docs" / "performance.md"
@@ -35,9 +34,7 @@ def squat(tmp_path_factory) -> str:
 
 @pytest.fixture(scope="module")
 def figures(squat) -> solve.Figures:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(compiled, "_FLAGS", ("-O0", "-shared", "-fPIC"))  # compiled without optimisation, which is faster
-        return solve.library(squat)
+    return solve.library(squat)
 
 
 def test_the_first_and_the_warm_solve_end_in_answers(figures):

@@ -101,7 +101,6 @@ COMMANDS = (
     "show",
     "doctor",
     "solve",
-    "precompile",
     "reproduce",
     "plot",
     "replay",

@@ -35,8 +35,8 @@ from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
 from multimodal_to.errors import InputError, ScenarioError
 from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.native import missing
 from multimodal_to.ocp import Formulation, build
-from multimodal_to.ocp import precompile as compile_problem
 from multimodal_to.ocp.integration import LEAPFROG
 from multimodal_to.scenarios import SCENARIOS, find
 from multimodal_to.scenarios import paper as as_in_paper
@@ -225,10 +225,12 @@ def solve(
     console.print(
         f"{scenario.title}: {the_robot.name}, {scenario.knots} knots, {problem.lower.size} variables, "
         f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s"
-        f"{' with compiled derivatives' if problem.nlp.compiled else ''}, "
+        f"{'' if problem.nlp.taped or missing() else ' with some functions by CasADi'}, "
         f"linear solver {chosen_solver.name}",
         soft_wrap=True,
     )
+    if without := missing():
+        console.print(f"warning: the solve takes longer, as {without}", soft_wrap=True)
     expectation = expect(scenario) if task.start is None and not paper else None
     if expectation is not None:
         console.print(f"{expectation}", soft_wrap=True)
@@ -248,24 +250,6 @@ def solve(
         console.print(f"wrote {path}", soft_wrap=True)
     if not solution.status.solved:
         raise typer.Exit(1)
-
-
-@app.command()
-def precompile(name: ScenarioName, settings: Settings = None, robot: RobotOption = "ironcub") -> None:
-    """Compile the derivatives of a scenario, once, for faster solves of it.
-
-    Takes a C compiler some ten seconds. Every later solve uses them as long as robot, ground and weights stay as they
-    are; targets and the number of knots may change.
-
-    Example: multimodal-to precompile take-off
-    """
-    started = time.perf_counter()
-    files = compile_problem(load_robot(robot), chosen(name, settings))
-    spent = f"{len(files)} functions compiled in {time.perf_counter() - started:.1f} s"
-    out.print(
-        f"{name}: {spent}, kept in {files[0].parent}" if files else f"{name}: nothing is worth compiling",
-        soft_wrap=True,
-    )
 
 
 def _explain(console: Console, relaxation: Relaxation) -> None:

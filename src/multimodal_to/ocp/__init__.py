@@ -1,6 +1,6 @@
 """What is asked: variables, terms, the integration rule, and the problem that they make."""
 
-from multimodal_to.ocp.building import build, precompile
+from multimodal_to.ocp.building import build
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.integration import BackwardEuler, IntegrationRule, Interval
 from multimodal_to.ocp.knot import Knot
@@ -27,5 +27,4 @@ __all__ = [
     "between",
     "build",
     "equal",
-    "precompile",
 ]

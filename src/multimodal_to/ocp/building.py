@@ -1,9 +1,8 @@
-"""`build`: a robot, a scenario and a formulation become a `Problem`; `precompile` compiles its derivatives."""
+"""`build`: a robot, a scenario and a formulation become a `Problem`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import casadi as cs
 import numpy as np
@@ -11,13 +10,12 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import FormulationError, listed
 from multimodal_to.models.robot import Robot
-from multimodal_to.ocp import compiled
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.guess import start_guess
 from multimodal_to.ocp.outline import formulate, prepared
 from multimodal_to.ocp.problem import BoundSet, Problem, RowSet
 from multimodal_to.ocp.stages import Held, NamedStage
-from multimodal_to.ocp.transcription import Nlp, assemble
+from multimodal_to.ocp.transcription import Stage, assemble, symbolic
 from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.scenario import Scenario
 
@@ -38,7 +36,8 @@ def build(robot: Robot, scenario: Scenario, formulation: Formulation | None = No
     robot, standing = prepared(robot, scenario)
     outline = formulate(robot, scenario, standing, formulation)
     layout = outline.layout
-    nlp = assemble([named.stage for named in outline.stages], layout.size, scenario.knots)
+    stages = [named.stage for named in outline.stages]
+    nlp = assemble(stages, layout.size, scenario.knots)
 
     scale = np.append(np.tile(layout.scale, scenario.knots + 1), formulation.interval_scale)
     lower, upper, box_lower, box_upper = (
@@ -54,7 +53,7 @@ def build(robot: Robot, scenario: Scenario, formulation: Formulation | None = No
         scenario=scenario,
         formulation=formulation,
         layout=layout,
-        opti=_opti(nlp, lower, upper, row_lower, row_upper),
+        opti=_opti(stages, layout.size, scenario.knots, (lower, upper), (row_lower, row_upper)),
         nlp=nlp,
         lower=lower,
         upper=upper,
@@ -70,29 +69,6 @@ def build(robot: Robot, scenario: Scenario, formulation: Formulation | None = No
     )
     _refuse_no_numbers(problem, outline.stages)
     return problem
-
-
-def precompile(robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> tuple[Path, ...]:
-    """Compile the derivatives of a scenario's problem, for every later `build` of one like it; return their files.
-
-    Takes a C compiler some ten seconds; an iteration of the solver then takes a seventh less. Alike are problems with
-    the same robot, ground, weights and terms, whatever their targets and numbers of knots.
-
-    Args:
-        robot: whose motion it is.
-        scenario: the task.
-        formulation: what the problem is made of; by default `Formulation.executable()`.
-
-    Raises:
-        ScenarioError: the scenario contradicts itself or does not fit the robot.
-        FormulationError: a term does not return what it has to.
-        SolverError: there is no C compiler, or it refuses.
-        OutputError: the folder of compiled derivatives cannot be written to.
-    """
-    robot, standing = prepared(robot, scenario)
-    outline = formulate(robot, scenario, standing, formulation or Formulation.executable())
-    repeated = [named.stage for named in outline.stages if named.stage.repeats > 1]
-    return compiled.compile_functions(function for stage in repeated for function in stage.derivatives())
 
 
 def _row_bounds(stages: Sequence[NamedStage]) -> tuple[Array, Array, dict[str, RowSet]]:
@@ -186,11 +162,22 @@ def _steep_costs(problem: Problem, named: NamedStage) -> list[str]:
     return steep
 
 
-def _opti(nlp: Nlp, lower: Array, upper: Array, row_lower: Array, row_upper: Array) -> cs.Opti:
-    """Return the `Opti` problem; bounds come first, so that they can be told from the rows."""
+def _opti(
+    stages: Sequence[Stage], size: int, knots: int, bounds: tuple[Array, Array], row_bounds: tuple[Array, Array]
+) -> cs.Opti:
+    """Return the `Opti` problem, which CasADi evaluates and derives itself; bounds come first.
+
+    Args:
+        stages: of the problem.
+        size: number of variables of a knot.
+        knots: N, the number of intervals.
+        bounds: of the variables.
+        row_bounds: of the rows.
+    """
     opti = cs.Opti()
-    x = opti.variable(lower.size)
-    opti.subject_to(opti.bounded(lower, x, upper))
-    opti.subject_to(opti.bounded(row_lower, nlp.rows(x), row_upper))
-    opti.minimize(nlp.objective(x))
+    x = opti.variable(bounds[0].size)
+    rows, objective = symbolic(stages, x, size, knots)
+    opti.subject_to(opti.bounded(bounds[0], x, bounds[1]))
+    opti.subject_to(opti.bounded(row_bounds[0], rows, row_bounds[1]))
+    opti.minimize(objective)
     return opti

@@ -1,4 +1,4 @@
-"""From stages to an NLP: values and exact derivatives built once per stage, mapped over the horizon, and assembled.
+"""From stages to an NLP: values and exact derivatives built once per stage, evaluated at all intervals, and assembled.
 
 A `Stage` is what repeats: rows and costs as SX in (start knot, end knot, Δt). Its Jacobian and Hessian blocks are
 small, and the horizon's matrices are these blocks at known places; deriving the whole graph would cost minutes.
@@ -6,9 +6,8 @@ small, and the horizon's matrices are these blocks at known places; deriving the
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as cs
@@ -16,14 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import SX
-from multimodal_to.ocp import compiled
+from multimodal_to.ocp.evaluation import Block, Entries, Evaluation, Output, mapped
 from multimodal_to.ocp.lifting import Lifted
 
 Integers = NDArray[np.int64]
-
-
-THREADS = min(os.cpu_count() or 1, 4)
-"""Threads that evaluate the stages; what comes out doesn't depend on their number."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,6 +67,21 @@ class Stage:
             [local + size * self.starts, local + size * (self.starts + 1), np.full((1, self.repeats), last)]
         )
 
+    def block(self, function: cs.Function, size: int, last: int, first_row: int = 0) -> Block:
+        """Return one of its functions at all its intervals.
+
+        Args:
+            function: of (z, z⁺, Δt), or of these, σ and λ.
+            size: number of variables of a knot.
+            last: place of Δt among all variables.
+            first_row: place of the stage's first row among all rows.
+        """
+        repeats = np.arange(self.repeats)
+        offsets = [size * self.starts, size * (self.starts + 1), np.full(self.repeats, last)]
+        offsets += [np.zeros(self.repeats, dtype=np.int64), first_row + self.rows.shape[0] * repeats]
+        count = int(function.n_in())
+        return Block(function=function, sources=(0, 0, 0, 2, 3)[:count], offsets=np.array(offsets[:count]))
+
     def row_function(self) -> cs.Function:
         """Return (z, z⁺, Δt) → rows."""
         return self._function("rows", self.rows)
@@ -110,11 +120,6 @@ class Stage:
         upper = self.lifted.hessian(sigma * cs.sum1(self.lifted_costs), self._arguments)
         return self._nonzeros("cost_hessian", upper, sigma)
 
-    def derivatives(self) -> tuple[cs.Function, ...]:
-        """Return the functions that nothing is derived of."""
-        pairs = (self.jacobian(), self.gradient(), self.hessian(), self.cost_hessian())
-        return tuple(function for function, _ in pairs)
-
     def _nonzeros(self, kind: str, matrix: SX, *more: SX) -> tuple[cs.Function, cs.Sparsity]:
         values = cs.vertcat(*matrix.nonzeros()) if matrix.nnz() else cs.SX(0, 1)
         return self._function(kind, values, *more), matrix.sparsity()
@@ -126,20 +131,25 @@ class Stage:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Nlp:
-    """Functions of all variables x = (vec Z, Δt) for CasADi's `nlpsol`, in its names and signatures."""
+    """Functions of all variables x = (vec Z, Δt) for CasADi's `nlpsol`, in its names and signatures.
 
-    rows: cs.Function  # x → g
-    costs: cs.Function  # x → costs by stage and name, stacked
-    objective: cs.Function  # x → f
-    gradient: cs.Function  # grad_f: (x, p) → f, ∇f, with an empty p
-    jacobian: cs.Function  # jac_g: (x, p) → g, ∂g/∂x
-    hessian: cs.Function  # hess_lag: (x, p, λ_f, λ_g) → upper Hessian of the Lagrangian
-    cost_hessian: cs.Function  # the same without the curvature of the rows
+    They are evaluated by tapes of the native library, where there is one. CasADi cannot derive them: `symbolic` can be.
+    Whoever hands them to CasADi has to keep them.
+    """
+
+    rows: Evaluation  # x → g
+    costs: Evaluation  # x → costs by stage and name, stacked
+    objective: Evaluation  # x → f
+    gradient: Evaluation  # grad_f: (x, p) → f, ∇f, with an empty p
+    jacobian: Evaluation  # jac_g: (x, p) → g, ∂g/∂x
+    hessian: Evaluation  # hess_lag: (x, p, λ_f, λ_g) → upper Hessian of the Lagrangian
+    cost_hessian: Evaluation  # the same without the curvature of the rows
 
     @property
-    def compiled(self) -> bool:
-        """Return whether the Hessian, the costliest of them, is machine code."""
-        return any(compiled.is_compiled(function) for function in self.hessian.find_functions())
+    def taped(self) -> bool:
+        """Return whether all of them are evaluated by tapes."""
+        every = (self.rows, self.costs, self.objective, self.gradient, self.jacobian, self.hessian, self.cost_hessian)
+        return all(each.taped for each in every)
 
 
 def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
@@ -153,109 +163,73 @@ def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
         knots: N, the number of intervals.
     """
     count = size * (knots + 1) + 1
-    x, p = cs.MX.sym("x", count), cs.MX.sym("p", 0)
-    factor, multipliers = cs.MX.sym("lam_f"), cs.MX.sym("lam_g", sum(s.rows.shape[0] * s.repeats for s in stages))
-    inputs = [_gather(stage, x, size, knots) for stage in stages]
-
-    rows, costs = [], []
-    gradients, jacobians, hessians, cost_hessians = _Blocks(), _Blocks(), _Blocks(), _Blocks()
-    first_row = 0
-    for stage, arguments in zip(stages, inputs, strict=True):
+    none = np.zeros((1, 1), dtype=np.int64)
+    rows, costs, gradients, jacobians, hessians, cost_hessians = (list[Entries]() for _ in range(6))
+    first_row = first_cost = 0
+    for stage in stages:
         places = stage.positions(size, count - 1)
         height = stage.rows.shape[0]
         row_places = first_row + np.arange(height)[:, None] + height * np.arange(stage.repeats)
-        own = cs.reshape(multipliers[first_row : first_row + height * stage.repeats], height, stage.repeats)
-        first_row += height * stage.repeats
-
-        rows.append(cs.vec(_mapped(stage.row_function(), stage.repeats)(*arguments)))
-        costs.append(cs.sum2(_mapped(stage.cost_function(), stage.repeats)(*arguments)))
+        cost_places = first_cost + np.arange(stage.costs.shape[0])[:, None]
+        rows.append(Entries(block=stage.block(stage.row_function(), size, count - 1), rows=row_places, columns=none))
+        costs.append(Entries(block=stage.block(stage.cost_function(), size, count - 1), rows=cost_places, columns=none))
         function, pattern = stage.gradient()
-        gradients.add(
-            _derivative(function, stage.repeats)(*arguments), places[pattern.row()], np.zeros_like(places[:1])
-        )
+        block = stage.block(function, size, count - 1)
+        gradients.append(Entries(block=block, rows=places[pattern.row()], columns=none))
         function, pattern = stage.jacobian()
         row, column = pattern.get_triplet()
-        jacobians.add(_derivative(function, stage.repeats)(*arguments), row_places[row], places[column])
+        block = stage.block(function, size, count - 1)
+        jacobians.append(Entries(block=block, rows=row_places[row], columns=places[column]))
         function, pattern = stage.hessian()
         row, column = pattern.get_triplet()
-        sigmas = cs.repmat(factor, 1, stage.repeats)
-        hessians.add(_derivative(function, stage.repeats)(*arguments, sigmas, own), places[row], places[column])
+        block = stage.block(function, size, count - 1, first_row)
+        hessians.append(Entries(block=block, rows=places[row], columns=places[column]))
         function, pattern = stage.cost_hessian()
         row, column = pattern.get_triplet()
-        cost_hessians.add(_derivative(function, stage.repeats)(*arguments, sigmas), places[row], places[column])
+        block = stage.block(function, size, count - 1, first_row)
+        cost_hessians.append(Entries(block=block, rows=places[row], columns=places[column]))
+        first_row += height * stage.repeats
+        first_cost += stage.costs.shape[0]
 
-    all_rows, all_costs = cs.vertcat(*rows), cs.vertcat(*costs)
-    objective = cs.sum1(all_costs)
+    rows, costs, gradients, jacobians, hessians, cost_hessians = (
+        [some for some in each if some.block.outputs]
+        for each in (rows, costs, gradients, jacobians, hessians, cost_hessians)
+    )
+    of_x, of_x_and_p = {"x": count}, {"x": count, "p": 0}
+    of_all = {"x": count, "p": 0, "lam_f": 1, "lam_g": first_row}
+    every_row = Output(name="g", shape=(first_row, 1), entries=rows, dense=True)
+    every_cost = Output(name="costs", shape=(first_cost, 1), entries=costs, dense=True)
+    objective = replace(every_cost, name="f", total=True)
+    gradient = Output(name="grad_f_x", shape=(count, 1), entries=gradients, dense=True)
+    jacobian = Output(name="jac_g_x", shape=(first_row, count), entries=jacobians)
+    hessian, cost_hessian = (
+        Output(name="triu_hess_gamma_x_x", shape=(count, count), entries=each) for each in (hessians, cost_hessians)
+    )
     return Nlp(
-        rows=cs.Function("rows", [x], [all_rows]),
-        costs=cs.Function("costs", [x], [all_costs]),
-        objective=cs.Function("objective", [x], [objective]),
-        gradient=cs.Function(
-            "nlp_grad_f", [x, p], [objective, cs.densify(gradients.matrix(count, 1))], ["x", "p"], ["f", "grad_f_x"]
-        ),
-        jacobian=cs.Function(
-            "nlp_jac_g", [x, p], [all_rows, jacobians.matrix(first_row, count)], ["x", "p"], ["g", "jac_g_x"]
-        ),
-        hessian=_hessian(x, p, factor, multipliers, hessians.matrix(count, count)),
-        cost_hessian=_hessian(x, p, factor, multipliers, cost_hessians.matrix(count, count)),
+        rows=Evaluation("rows", of_x, [every_row]),
+        costs=Evaluation("costs", of_x, [every_cost]),
+        objective=Evaluation("objective", of_x, [objective]),
+        gradient=Evaluation("nlp_grad_f", of_x_and_p, [objective, gradient]),
+        jacobian=Evaluation("nlp_jac_g", of_x_and_p, [every_row, jacobian]),
+        hessian=Evaluation("nlp_hess_l", of_all, [hessian]),
+        cost_hessian=Evaluation("nlp_hess_l", of_all, [cost_hessian]),
     )
 
 
-def _mapped(function: cs.Function, repeats: int) -> cs.Function:
-    """Return a function of `repeats` columns, evaluated by `THREADS` at once; each column is what it would be alone."""
-    return function if repeats == 1 else function.map(repeats, "thread", min(THREADS, repeats))
+def symbolic(stages: Sequence[Stage], x: cs.MX, size: int, knots: int) -> tuple[cs.MX, cs.MX]:
+    """Return rows and objective at x as expressions that CasADi evaluates and derives itself.
 
-
-def _derivative(function: cs.Function, repeats: int) -> cs.Function:
-    """Return the same for a function that is not derived again, which may be machine code."""
-    return _mapped(function if repeats == 1 else compiled.machine_code(function), repeats)
-
-
-def _hessian(x: cs.MX, p: cs.MX, factor: cs.MX, multipliers: cs.MX, matrix: cs.MX) -> cs.Function:
-    return cs.Function(
-        "nlp_hess_l", [x, p, factor, multipliers], [matrix], ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]
-    )
-
-
-def _gather(stage: Stage, x: cs.MX, size: int, knots: int) -> tuple[cs.MX, cs.MX, cs.MX]:
-    """Return the stage's arguments, one column per interval."""
+    Args:
+        stages: as for `assemble`.
+        x: all variables.
+        size: number of variables of a knot.
+        knots: N, the number of intervals.
+    """
     variables = cs.reshape(x[:-1], size, knots + 1)
-    starts = stage.starts.tolist()
-    ends = (stage.starts + 1).tolist()
-    return variables[:, starts], variables[:, ends], cs.repmat(x[-1], 1, stage.repeats)
-
-
-class _Blocks:
-    """Nonzeros of many blocks with their places in one big matrix; places that coincide add up."""
-
-    def __init__(self) -> None:
-        self._values: list[cs.MX] = []
-        self._rows: list[Integers] = []
-        self._columns: list[Integers] = []
-
-    def add(self, values: cs.MX, rows: Integers, columns: Integers) -> None:
-        """Add blocks: nonzeros (nnz, repeats), with rows and columns that broadcast to that shape.
-
-        Args:
-            values: nonzeros of each block, (nnz, repeats).
-            rows: where they stand, of a shape that broadcasts to that of the values.
-            columns: likewise.
-        """
-        shape = tuple(values.shape)
-        self._values.append(cs.vec(values))
-        self._rows.append(np.broadcast_to(rows, shape).ravel(order="F"))
-        self._columns.append(np.broadcast_to(columns, shape).ravel(order="F"))
-
-    def matrix(self, height: int, width: int) -> cs.MX:
-        """Return the (height, width) sum of all blocks."""
-        keys = np.concatenate(self._columns) * height + np.concatenate(self._rows)
-        places, first, index = np.unique(keys, return_index=True, return_inverse=True)
-        starts = np.searchsorted(places, height * np.arange(width + 1))
-        pattern = cs.Sparsity(height, width, starts.tolist(), (places % height).tolist())
-        values = cs.vertcat(*self._values)
-        again = np.setdiff1d(np.arange(keys.size), first, assume_unique=True)
-        total = values[first.tolist()]
-        if again.size:
-            adder = cs.Sparsity(places.size, again.size, list(range(again.size + 1)), index[again].tolist())
-            total += cs.mtimes(cs.DM(adder, np.ones(again.size)), values[again.tolist()])
-        return cs.MX(pattern, total)
+    rows, costs = list[cs.MX](), list[cs.MX]()
+    for stage in stages:
+        starts, ends = variables[:, stage.starts.tolist()], variables[:, (stage.starts + 1).tolist()]
+        arguments = starts, ends, cs.repmat(x[-1], 1, stage.repeats)
+        rows.append(cs.vec(mapped(stage.row_function(), stage.repeats)(*arguments)))
+        costs.append(cs.sum2(mapped(stage.cost_function(), stage.repeats)(*arguments)))
+    return cs.vertcat(*rows), cs.sum1(cs.vertcat(*costs))

@@ -183,44 +183,31 @@ def _passes(start: StartPoint) -> tuple[Pass, ...]:
 @machine.memory_kept()
 def _run(problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher) -> tuple[Array, dict[str, Any]]:
     """Run IPOPT once from x; return where it ended, answer or not, and its statistics."""
-    opti = problem.opti.copy()  # goes with its solver and memory when this solve ends
+    nlp, symbol = problem.nlp, cs.MX.sym("x", problem.lower.size)
     options: dict[str, Any] = {
         "print_time": False,
+        "no_nlp_grad": True,  # for the multipliers of parameters, of which there are none
+        "calc_lam_p": False,
         "record_time": True,
-        "detect_simple_bounds": True,
-        "jac_g": problem.nlp.jacobian,
-        "grad_f": problem.nlp.gradient,
-        "hess_lag": problem.nlp.cost_hessian if watcher.which is Pass.ROUGH else problem.nlp.hessian,
+        "error_on_fail": False,
+        "jac_g": nlp.jacobian,
+        "grad_f": nlp.gradient,
+        "hess_lag": nlp.cost_hessian if watcher.which is Pass.ROUGH else nlp.hessian,
         "iteration_callback": watcher,
+        "ipopt": ipopt_options,
     }
-    opti.solver("ipopt", options, ipopt_options)
-    opti.set_initial(opti.x, x)
-    failure: RuntimeError | None = None
+    functions = {"x": symbol, "f": nlp.objective(symbol), "g": nlp.rows(symbol)}
     try:
-        opti.solve_limited()
-    except RuntimeError as error:  # how Opti says that there is no solution, and everything else
-        failure = error
+        solver = cs.nlpsol("solver", "ipopt", functions, options)  # goes with its memory when this solve ends
+        ended = solver(x0=x, lbx=problem.lower, ubx=problem.upper, lbg=problem.row_lower, ubg=problem.row_upper)
+    except RuntimeError as error:
+        raise watcher.error or SolverError(f"the solver did not run: {error}") from error
     if watcher.error is not None:
         raise watcher.error
-    try:
-        statistics = dict(opti.debug.stats())
-    except RuntimeError:  # no solver has run
-        raise SolverError(f"the solver did not run: {failure}") from failure
-    _check_bounds(problem, statistics)
+    statistics = dict(solver.stats())
     if watcher.stopped:
         statistics["return_status"] = "User_Requested_Stop"  # also where a second Ctrl-C broke an evaluation off
-    return np.array(opti.debug.value(opti.x)).ravel(), statistics
-
-
-def _check_bounds(problem: Problem, statistics: dict[str, Any]) -> None:
-    """Make sure that CasADi took the bounds, and nothing but the bounds, out of the rows.
-
-    The derivative functions are those of the remaining rows; were others left, the solver would work on wrong ones.
-    """
-    found = np.array(statistics["detect_simple_bounds_is_simple"], dtype=bool)
-    expected = np.arange(found.size) < problem.lower.size
-    if not np.array_equal(found, expected):
-        raise SolverError(f"CasADi took {found.sum()} rows for bounds, where {expected.sum()} are")
+    return np.array(ended["x"]).ravel(), statistics
 
 
 class _Watcher(cs.Callback):  # type: ignore[misc]
@@ -229,7 +216,6 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
     def __init__(self, problem: Problem, watch: Watch, iteration: int, which: Pass) -> None:
         cs.Callback.__init__(self)
         self._problem, self._watch, self._iteration = problem, watch, iteration
-        self._rows_first: bool | None = None
         self.which, self.stopped = which, False
         self.error: Exception | None = None
         self.construct("watcher")
@@ -245,7 +231,7 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
 
     def get_sparsity_in(self, index: int) -> cs.Sparsity:
         variables = self._problem.lower.size
-        rows = variables + self._problem.row_lower.size  # Opti counts the bounds among them
+        rows = self._problem.row_lower.size
         sizes = {"f": 1, "x": variables, "lam_x": variables, "g": rows, "lam_g": rows, "lam_p": 0}
         return cs.Sparsity.dense(sizes.get(cs.nlpsol_out(index), 0), 1)
 
@@ -261,25 +247,11 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
     def _show(self, arguments: list[Any]) -> bool:
         values = dict(zip((cs.nlpsol_out(index) for index in range(len(arguments))), arguments, strict=True))
         x = values["x"].full().ravel()
-        rows = self._rows(x, values["g"])
         self._iteration += 1
         return self._watch(
             x,
             iteration=self._iteration - 1,
-            rows=rows,
+            rows=values["g"].full().ravel(),
             objective=float(values["f"]),
             label=self.which.value,
         )
-
-    def _rows(self, x: Array, g: cs.DM) -> Array:
-        """Return the rows at x, without evaluating them again where CasADi hands them over.
-
-        With bounds taken out of g, it leaves the rows in the first places of g and nothing in the others. That is not
-        documented, so it is looked at in the first iterate.
-        """
-        if self._rows_first is False:
-            return self._problem.rows_at(x)
-        first: Array = g[: self._problem.row_lower.size].full().ravel()
-        if self._rows_first is None:
-            self._rows_first = np.allclose(first, self._problem.rows_at(x), rtol=0.0, atol=1e-9)
-        return first if self._rows_first else self._problem.rows_at(x)

@@ -126,6 +126,8 @@ def _run(problem: Problem, elastic: _Elastic, start: Array, solver: Ipopt) -> tu
     nlp, derivatives = _relaxed(problem, elastic, start)
     options = {
         "print_time": False,
+        "no_nlp_grad": True,  # for the multipliers of parameters, of which there are none
+        "calc_lam_p": False,
         "error_on_fail": False,
         "ipopt": own.options(solver.max_iterations, solver.time_limit, Pass.EXACT),
         **derivatives,
