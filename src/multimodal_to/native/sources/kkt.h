@@ -60,7 +60,7 @@ typedef struct {
   int knots;
   const int *knot;          /* of each variable; −1: a global one */
   int triplets, *place;     /* of each triplet of IPOPT: its entry */
-  int entries, *row, *column;
+  int entries, *row, *column, *column_start; /* entries are numbered column by column */
   KktRows rows;             /* equality rows, then inequality rows: their variables */
   KktRows curvature;        /* of each variable: the variables, itself too, that it has an entry with */
   int *equality_diagonal;   /* entries, −1: none */

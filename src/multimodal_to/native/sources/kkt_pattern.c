@@ -11,6 +11,7 @@ static void number_entries(KktArena *arena, KktPattern *p, const int *irn, const
   p->place = kkt_take(arena, triplets, sizeof(int));
   p->row = kkt_take(arena, triplets, sizeof(int));
   p->column = kkt_take(arena, triplets, sizeof(int));
+  p->column_start = kkt_take(arena, n + 1, sizeof(int));
   for (int t = 0; t < p->triplets; t++) start[irn[t] < jcn[t] ? irn[t] : jcn[t]]++; /* they count from one */
   for (int i = 0; i < p->size; i++) start[i + 1] += start[i];
   memcpy(next, start, sizeof(int) * n);
@@ -18,7 +19,7 @@ static void number_entries(KktArena *arena, KktPattern *p, const int *irn, const
   for (int i = 0; i < p->size; i++) number[i] = -1;
   p->entries = 0;
   for (int column = 0; column < p->size; column++) {
-    int first = p->entries;
+    int first = p->column_start[column] = p->entries;
     for (int q = start[column]; q < start[column + 1]; q++) {
       int t = order[q], row = (irn[t] > jcn[t] ? irn[t] : jcn[t]) - 1;
       if (number[row] < first) {
@@ -29,6 +30,7 @@ static void number_entries(KktArena *arena, KktPattern *p, const int *irn, const
       p->place[t] = number[row];
     }
   }
+  p->column_start[p->size] = p->entries;
 }
 
 enum { VARIABLE, SLACK, EQUALITY, INEQUALITY };

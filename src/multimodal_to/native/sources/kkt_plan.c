@@ -2,9 +2,9 @@
 #include "kkt_plan.h"
 
 #include <math.h>
-#include <string.h>
+#include <stdlib.h>
 
-enum { SUBSTITUTION_MOST = 6000 }; /* products that a substitution may take: what it saves is about as much */
+enum { SUBSTITUTION_MOST = 2500 }; /* products that a substitution may take: what it saves is about as much */
 #define DEFINES 0.01               /* least |a| of a defined variable, as a share of the largest in its row */
 
 static int *filled(KktArena *arena, int count, int value) {
@@ -80,64 +80,111 @@ static void find_ranges(const KktPlanning *planning, int *first, int *last) {
 }
 
 typedef struct {
+  int row, place, variable; /* place: among the entries of the rows */
+  int conflicts;            /* other rows that could define something but have the variable in them */
+  int reach;                /* fronts that the variable lives over */
+  int products;             /* that the substitution takes */
+} Candidate;
+
+typedef struct {
   KktPlanning *planning;
-  int *first, *last;     /* fronts of each variable */
-  int *degree;           /* entries and row columns that a variable meets */
-  char *of_row;          /* variables in a row that defines another */
+  int *first, *last; /* fronts of each variable */
+  int *degree;       /* other unknowns that a variable meets */
+  Candidate *candidate;
+  int candidates;
 } Choice;
 
-/* How many products the substitution of a variable by a row takes; −1 where it must not be. */
-static int price(const Choice *choice, int row, int q) {
+static void find_degrees(Choice *choice) {
   const KktPattern *p = choice->planning->pattern;
-  const KktDefinitions *chosen = &choice->planning->plan->definitions;
-  int v = p->rows.column[q], length = p->rows.start[row + 1] - p->rows.start[row];
-  double largest = 0, own = fabs(choice->planning->value[p->rows.entry[q]]);
-  if (p->knot[v] < 0 || choice->of_row[v] || chosen->of_variable[v] >= 0) return -1;
-  for (int other = p->rows.start[row]; other < p->rows.start[row + 1]; other++) {
-    int j = p->rows.column[other];
-    double size = fabs(choice->planning->value[p->rows.entry[other]]);
-    if (size > largest) largest = size;
-    if (j == v) continue;
-    if (chosen->of_variable[j] >= 0 || choice->first[j] > choice->first[v] || choice->last[j] < choice->last[v]) return -1;
+  KktArena *arena = choice->planning->arena;
+  int rows = p->equalities + p->slacks, *met = filled(arena, p->variables, -1);
+  KktList *rows_with = kkt_take(arena, (size_t)p->variables + 1, sizeof(KktList));
+  for (int r = 0; r < rows; r++)
+    for (int q = p->rows.start[r]; q < p->rows.start[r + 1]; q++) kkt_push(arena, &rows_with[p->rows.column[q]], r);
+  for (int i = 0; i < p->variables; i++) {
+    if (p->knot[i] < 0) continue;
+    choice->degree[i] = p->curvature.start[i + 1] - p->curvature.start[i];
+    for (int q = p->curvature.start[i]; q < p->curvature.start[i + 1]; q++) met[p->curvature.column[q]] = i;
+    for (int t = 0; t < rows_with[i].count; t++) {
+      int r = rows_with[i].items[t];
+      choice->degree[i] += r < p->equalities;
+      for (int q = p->rows.start[r]; r >= p->equalities && q < p->rows.start[r + 1]; q++) {
+        choice->degree[i] += met[p->rows.column[q]] != i;
+        met[p->rows.column[q]] = i;
+      }
+    }
   }
-  if (!(own >= DEFINES * largest) || own == 0) return -1;
-  return choice->degree[v] < SUBSTITUTION_MOST ? length * choice->degree[v] : -1;
 }
 
-static void define(Choice *choice, int row, int q) {
+/* Products that the substitution takes: what the variable meets, and the row itself, each with every entry of the row. */
+static double products(const Choice *choice, int v, int length) { return (double)length * (choice->degree[v] + length); }
+
+/* Whether a row may define the variable in place q: it is large enough, and lives where the row's others live too. */
+static int may_define(const Choice *choice, int row, int q) {
   const KktPattern *p = choice->planning->pattern;
-  KktDefinitions *chosen = &choice->planning->plan->definitions;
-  int v = p->rows.column[q];
-  chosen->variable[chosen->count] = v;
-  chosen->row[chosen->count] = row;
-  chosen->entry[chosen->count] = p->rows.entry[q];
-  chosen->of_variable[v] = chosen->of_row[row] = chosen->count++;
-  for (int other = p->rows.start[row]; other < p->rows.start[row + 1]; other++) choice->of_row[p->rows.column[other]] = 1;
+  const double *value = choice->planning->value;
+  int v = p->rows.column[q], length = p->rows.start[row + 1] - p->rows.start[row];
+  double largest = 0, own = fabs(value[p->rows.entry[q]]);
+  if (p->knot[v] < 0 || own == 0 || products(choice, v, length) > SUBSTITUTION_MOST) return 0;
+  for (int other = p->rows.start[row]; other < p->rows.start[row + 1]; other++) {
+    int j = p->rows.column[other];
+    largest = fmax(largest, fabs(value[p->rows.entry[other]]));
+    if (choice->first[j] > choice->first[v] || choice->last[j] < choice->last[v]) return 0;
+  }
+  return own >= DEFINES * largest;
+}
+
+static void find_candidates(Choice *choice) {
+  const KktPattern *p = choice->planning->pattern;
+  KktArena *arena = choice->planning->arena;
+  int *rows_with = filled(arena, p->variables, 0);
+  choice->candidate = kkt_take(arena, (size_t)p->rows.start[p->equalities] + 1, sizeof(Candidate));
+  for (int row = 0; row < p->equalities; row++) {
+    int before = choice->candidates;
+    for (int q = p->rows.start[row]; q < p->rows.start[row + 1]; q++) {
+      if (!may_define(choice, row, q)) continue;
+      int v = p->rows.column[q], length = p->rows.start[row + 1] - p->rows.start[row];
+      choice->candidate[choice->candidates++] = (Candidate){
+        .row = row, .place = q, .variable = v, .reach = choice->last[v] - choice->first[v], .products = (int)products(choice, v, length),
+      };
+    }
+    if (choice->candidates > before)
+      for (int q = p->rows.start[row]; q < p->rows.start[row + 1]; q++) rows_with[p->rows.column[q]]++;
+  }
+  for (int i = 0; i < choice->candidates; i++) choice->candidate[i].conflicts = rows_with[choice->candidate[i].variable] - 1;
+}
+
+static int compare_candidates(const void *one, const void *other) {
+  const Candidate *a = one, *b = other;
+  if (a->conflicts != b->conflicts) return a->conflicts < b->conflicts ? -1 : 1;
+  if (a->reach != b->reach) return a->reach > b->reach ? -1 : 1;
+  if (a->products != b->products) return a->products < b->products ? -1 : 1;
+  return (a->place > b->place) - (a->place < b->place);
 }
 
 void kkt_choose_definitions(KktPlanning *planning) {
   const KktPattern *p = planning->pattern;
+  KktDefinitions *chosen = &planning->plan->definitions;
   Choice choice = {.planning = planning};
   choice.first = filled(planning->arena, p->variables, 0);
   choice.last = filled(planning->arena, p->variables, 0);
   choice.degree = filled(planning->arena, p->variables, 0);
-  choice.of_row = kkt_take(planning->arena, (size_t)p->variables, 1);
+  char *in_row = kkt_take(planning->arena, (size_t)p->variables + 1, 1); /* variables in a row that defines another */
   find_ranges(planning, choice.first, choice.last);
-  for (int i = 0; i < p->variables; i++) choice.degree[i] = p->curvature.start[i + 1] - p->curvature.start[i];
-  for (int r = 0; r < p->equalities + p->slacks; r++) {
-    int length = p->rows.start[r + 1] - p->rows.start[r];
-    for (int q = p->rows.start[r]; q < p->rows.start[r + 1]; q++)
-      choice.degree[p->rows.column[q]] += r < p->equalities ? 1 : length;
-  }
-  for (int row = 0; row < p->equalities; row++) {
-    int best = -1, cost = 0;
-    for (int q = p->rows.start[row]; q < p->rows.start[row + 1]; q++) {
-      int asked = price(&choice, row, q), v = p->rows.column[q];
-      if (asked < 0 || asked > SUBSTITUTION_MOST) continue;
-      int longer = best < 0 ? 1 : choice.last[v] - choice.first[v] - choice.last[p->rows.column[best]] + choice.first[p->rows.column[best]];
-      if (longer > 0 || (longer == 0 && asked < cost)) best = q, cost = asked;
-    }
-    if (best >= 0) define(&choice, row, best);
+  find_degrees(&choice);
+  find_candidates(&choice);
+  qsort(choice.candidate, (size_t)choice.candidates, sizeof(Candidate), compare_candidates);
+  for (int i = 0; i < choice.candidates; i++) {
+    const Candidate *c = &choice.candidate[i];
+    int free_of_others = chosen->of_row[c->row] < 0 && !in_row[c->variable];
+    for (int q = p->rows.start[c->row]; q < p->rows.start[c->row + 1] && free_of_others; q++)
+      free_of_others = chosen->of_variable[p->rows.column[q]] < 0;
+    if (!free_of_others) continue;
+    chosen->variable[chosen->count] = c->variable;
+    chosen->row[chosen->count] = c->row;
+    chosen->entry[chosen->count] = p->rows.entry[c->place];
+    chosen->of_variable[c->variable] = chosen->of_row[c->row] = chosen->count++;
+    for (int q = p->rows.start[c->row]; q < p->rows.start[c->row + 1]; q++) in_row[p->rows.column[q]] = 1;
   }
 }
 

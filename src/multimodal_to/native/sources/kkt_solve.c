@@ -213,10 +213,15 @@ void kkt_solve(KktMatrix *matrix, const KktPlan *plan, double *rhs) {
 
 void kkt_residual(const KktMatrix *matrix, const double *rhs, const double *x, double *residual) {
   const KktPattern *p = matrix->pattern;
+  const double *value = matrix->value;
   memcpy(residual, rhs, sizeof(double) * (size_t)p->size);
-  for (int e = 0; e < p->entries; e++) {
-    int i = p->row[e], j = p->column[e];
-    residual[i] -= matrix->value[e] * x[j];
-    if (i != j) residual[j] -= matrix->value[e] * x[i];
+  for (int j = 0; j < p->size; j++) {
+    double sum = 0, of_column = x[j];
+    for (int e = p->column_start[j]; e < p->column_start[j + 1]; e++) {
+      int i = p->row[e];
+      sum += value[e] * x[i];
+      if (i != j) residual[i] -= value[e] * of_column;
+    }
+    residual[j] -= sum;
   }
 }

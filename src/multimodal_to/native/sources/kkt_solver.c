@@ -9,7 +9,7 @@
 #define PIVOT_LEAST 1e-8      /* usual threshold of pivots */
 #define PIVOT_SAFER 1e-5      /* where solves were poor */
 #define RESIDUAL_REACH 1e-10  /* |K x − b| / |b| that ends refinement */
-#define RESIDUAL_POOR 1e-6    /* that asks for another factorisation */
+#define RESIDUAL_POOR 1e-6    /* |K x − b| / (|x| + |b|) that asks for another factorisation */
 enum { REFINEMENTS_MOST = 3, LARGEST_FRONT = 2000 };
 #define OPERATIONS_MOST 2e11
 
@@ -131,7 +131,7 @@ int kkt_take_structure(Kkt *kkt, int size, int triplets, const int *irn, const i
 
 /* Return the plan with or without definitions, made where it is needed first; NULL where there is none. */
 static KktPlan *plan_of(Kkt *kkt, int without) {
-  KktPlan *plan = &kkt->plan[without];
+  KktPlan *const plan = &kkt->plan[without];
   jmp_buf failure;
   double started = now();
   if (plan->factors) return plan;
@@ -195,7 +195,7 @@ static double largest(const double *values, int count) {
   return most;
 }
 
-/* Solve with refinement (J. H. Wilkinson, 1963); x goes to rhs; returns |K x − b| / |b|, infinity where there is none. */
+/* Solve with refinement (J. H. Wilkinson, 1963); returns |K x − b| / (|x| + |b|), infinity where x is no number. */
 static double solve_refined(Kkt *kkt, const double *b, double *x) {
   int n = kkt->pattern.size;
   double scale = largest(b, n), last = INFINITY;
@@ -206,9 +206,9 @@ static double solve_refined(Kkt *kkt, const double *b, double *x) {
     double left = largest(kkt->residual, n);
     if (!(left < last)) { /* no better: back to what was */
       if (step) memcpy(x, kkt->best, sizeof(double) * (size_t)n);
-      return isfinite(last) ? last / scale : INFINITY;
+      return isfinite(last) ? last / (scale + largest(x, n)) : INFINITY;
     }
-    if (left <= RESIDUAL_REACH * scale || step == REFINEMENTS_MOST) return scale > 0 ? left / scale : 0;
+    if (left <= RESIDUAL_REACH * scale || step == REFINEMENTS_MOST) return scale > 0 ? left / (scale + largest(x, n)) : 0;
     last = left;
     memcpy(kkt->best, x, sizeof(double) * (size_t)n);
     kkt_solve(&kkt->matrix, kkt->current, kkt->residual);
