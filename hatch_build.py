@@ -31,7 +31,7 @@ def recipe(root: str | Path) -> ModuleType:
 
 
 class NativeLibrary(BuildHookInterface[Any]):
-    """Compiles the library for a wheel, or for an editable installation in its place among the sources.
+    """Compiles the library into a wheel, or for an editable installation into its place among the sources.
 
     Where it cannot be compiled, the package is built without it, for every platform, and works without it.
     """
@@ -41,30 +41,36 @@ class NativeLibrary(BuildHookInterface[Any]):
         return [] if _skipped() else recipe(self.root).requirements()
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Compile the library."""
+        """Compile the library; it is left alone where it stands among the sources and was built from them."""
         if _skipped():
             return
         compiling = recipe(self.root)
-        self._folder = tempfile.mkdtemp()
         name = compiling.library_name()
-        in_place = Path(self.root, "src", NATIVE, name)
-        library = in_place if version == "editable" else Path(self._folder, name)
         try:
-            compiler = compiling.any_compiler()
-            compiling.build(library, compiler)
+            if version == "editable":
+                library = Path(self.root, "src", NATIVE, name)
+                if not compiling.is_current(library):
+                    _build(compiling, library, compiling.any_compiler())
+                return
+            self._folder = tempfile.mkdtemp()
+            library, compiler = Path(self._folder, name), compiling.any_compiler()
+            _build(compiling, library, compiler)
         except compiling.BuildError as error:
-            self.app.display_warning(
-                f"multimodal_to is installed without its native library, solves are slower: {error}"
-            )
+            self.app.display_warning(f"multimodal-to comes without its native library, solves take longer: {error}")
             return
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{compiling.platform_tag(compiler)}"
-        if version != "editable":
-            build_data["force_include"][str(library)] = (NATIVE / name).as_posix()
+        build_data["force_include"][str(library)] = (NATIVE / name).as_posix()
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         """Remove what was needed on the way."""
         shutil.rmtree(getattr(self, "_folder", ""), ignore_errors=True)
+
+
+def _build(compiling: ModuleType, library: Path, compiler: Any) -> None:
+    compiling.build(library, compiler)
+    if not compiling.is_current(library):
+        raise compiling.BuildError(f"what {compiler.name} made does not open")
 
 
 def _skipped() -> bool:

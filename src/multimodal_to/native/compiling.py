@@ -14,8 +14,9 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -29,9 +30,9 @@ _GLIBC = "2.17"
 """The oldest glibc that a library made by Zig loads with: that of manylinux2014, as CasADi's wheels."""
 _MACOS = "11.0"
 """The oldest macOS that a library loads on."""
-_TIMEOUT = 600.0  # for one call of a compiler [s]; the first one of Zig compiles the C library
+_TIMEOUT = 600.0  # for one call of a compiler [s]; the first one of Zig compiles parts of the C library
 
-_COMMON = ("-std=gnu11", "-O3", "-fno-math-errno", "-fvisibility=hidden")
+_COMMON = ("-std=gnu11", "-O3", "-fno-math-errno", "-fvisibility=hidden", f"-I{SOURCES}")
 _SETS: dict[str, dict[str, tuple[str, ...]]] = {
     "x86_64": {
         "sse2": (),
@@ -51,8 +52,15 @@ _TINY = """
 typedef double vector __attribute__((vector_size(16)));
 __attribute__((visibility("default"))) double mt_tiny(double x) { vector v = {x, x}; v = v * v; return sqrt(v[0]); }
 """
-"""What a compiler is tried with; every file is compiled with the flags of every instruction set."""
+"""What a compiler is tried with, once with the flags of every instruction set."""
 _OPEN = "import ctypes, sys; ctypes.CDLL(sys.argv[1])"
+_READ = """
+import ctypes, sys
+read = ctypes.CDLL(sys.argv[1]).mt_fingerprint
+read.restype = ctypes.c_char_p
+sys.exit(read().decode() != sys.argv[2])
+"""
+"""Opening a file runs in a child process: a broken one may end it, and Windows lets nobody replace an open one."""
 
 
 class BuildError(Exception):
@@ -69,12 +77,12 @@ class Compiler:
     @property
     def name(self) -> str:
         """Return what it is called in a sentence."""
-        return "ziglang" if self.is_zig else self.command[0]
+        return "ziglang" if self.is_zig else " ".join(self.command)
 
     @property
     def is_zig(self) -> bool:
-        """Return whether it is Zig from PyPI."""
-        return "ziglang" in self.command
+        """Return whether it is Zig, which compiles for the processor that it runs on unless a target is named."""
+        return Path(self.command[0]).stem == "zig"
 
     @property
     def machine(self) -> str:
@@ -87,23 +95,45 @@ class Compiler:
         return self.target.split("-")[1].partition(".")[0]
 
     @property
-    def instruction_sets(self) -> tuple[str, ...]:
-        """Return the instruction sets that kernels are compiled for, the smallest first."""
-        return tuple(_SETS.get(self.machine, _OTHER_MACHINE))
+    def instruction_sets(self) -> Mapping[str, tuple[str, ...]]:
+        """Return the instruction sets that kernels are compiled for, the smallest first, with their flags."""
+        return _SETS.get(self.machine, _OTHER_MACHINE)
 
-    def flags(self) -> tuple[str, ...]:
-        """Return the arguments that every call takes."""
+    def compile(self, source: Path, made: Path, *flags: str) -> None:
+        """Compile a file to an object.
+
+        Raises:
+            BuildError: the compiler fails.
+        """
+        self._call(made, *_COMMON, *self._flags(), *flags, "-c", str(source))
+
+    def link(self, objects: Iterable[Path], made: Path, *flags: str) -> None:
+        """Make a shared library of objects, without the names that nobody needs.
+
+        Raises:
+            BuildError: the compiler fails.
+        """
+        mathematics = [] if self.system == "windows" else ["-lm"]
+        stripped = [] if self.system == "macos" else ["-s"]
+        self._call(made, *self._flags(), *flags, "-shared", *map(str, objects), *mathematics, *stripped)
+
+    def _flags(self) -> tuple[str, ...]:
+        """Return the arguments that every call takes: those of the system, and of the plainest processor."""
         flags: tuple[str, ...] = () if self.system == "windows" else ("-fPIC", "-pthread")
         if self.is_zig:
             return *flags, "-target", self.target, "-g0", "-fno-sanitize=undefined"
-        return (*flags, f"-mmacosx-version-min={_MACOS}") if self.system == "macos" else flags
+        if self.machine == "x86_64":
+            flags += ("-march=x86-64",)
+        if self.system == "macos":
+            flags += ("-arch", _apple(self.machine), f"-mmacosx-version-min={_MACOS}")
+        return flags
 
-    def library_flags(self) -> tuple[str, ...]:
-        """Return the arguments that make a shared library, after its objects."""
-        return ("-shared", "-s") if self.system == "windows" else ("-shared", "-lm", *self._stripped())
+    def _call(self, made: Path, *arguments: str) -> None:
+        cache = str(made.with_name("zig-cache"))  # else Zig keeps 90 MB in the home folder
+        _run([*self.command, *arguments, "-o", str(made)], ZIG_GLOBAL_CACHE_DIR=cache, ZIG_LOCAL_CACHE_DIR=cache)
 
-    def _stripped(self) -> tuple[str, ...]:
-        return () if self.system == "macos" else ("-s",)
+
+# ---------------------------------------------------------------- what is compiled for
 
 
 def native_target() -> str:
@@ -116,8 +146,8 @@ def native_target() -> str:
     return f"{machine}-linux-gnu.{_GLIBC}" if platform.libc_ver()[0] == "glibc" else f"{machine}-linux-musl"
 
 
-def library_name(target: str | None = None) -> str:
-    """Return the name of the library's file on a system, by default on this one."""
+def library_name(target: str = "") -> str:
+    """Return the name of the library's file for a target, by default for this machine."""
     suffixes = {"windows": ".dll", "macos": ".dylib"}
     return "_native" + suffixes.get(_compiler((), target).system, ".so")
 
@@ -127,57 +157,48 @@ def platform_tag(compiler: Compiler) -> str:
 
     Zig compiles for an old glibc, others for the one that is here.
     """
-    machine = compiler.machine
     if compiler.system == "macos":
-        return f"macosx_{_MACOS.replace('.', '_')}_{'arm64' if machine == 'aarch64' else machine}"
-    if compiler.is_zig and "-gnu" in compiler.target and compiler.system == "linux":
-        return f"manylinux_{_GLIBC.replace('.', '_')}_{machine}"
+        return f"macosx_{_MACOS.replace('.', '_')}_{_apple(compiler.machine)}"
+    if compiler.is_zig and "-linux-gnu." in compiler.target:
+        return f"manylinux_{_GLIBC.replace('.', '_')}_{compiler.machine}"
     return sysconfig.get_platform().replace("-", "_").replace(".", "_")
 
 
-def fingerprint(sources: Path = SOURCES) -> str:
-    """Return a number of 16 digits that changes with any file of the sources, or with this one."""
-    digest = hashlib.sha256()
-    for file in (Path(__file__), *sorted(sources.glob("*.[ch]"))):
-        digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
-    return digest.hexdigest()[:16]
+def _apple(machine: str) -> str:
+    return "arm64" if machine == "aarch64" else machine
 
 
-def own_compilers() -> list[Compiler]:
-    """Return the compilers of this machine: what CC names, and those of the usual names; none has been tried."""
-    named = shlex.split(os.environ.get("CC", ""))
-    usual = [[path] for path in map(shutil.which, ("cc", "gcc", "clang")) if path]
-    return [_compiler(tuple(command)) for command in ([named] if named else []) + usual]
-
-
-def zig(target: str | None = None) -> Compiler:
-    """Return Zig from PyPI as a compiler for a target, by default for this machine.
-
-    Raises:
-        BuildError: it is not installed.
-    """
-    if find_spec("ziglang") is None:
-        raise BuildError("ziglang is not installed")
-    return _compiler((sys.executable, "-m", "ziglang", "cc"), target)
-
-
-def _compiler(command: tuple[str, ...], target: str | None = None) -> Compiler:
-    return Compiler(command=command, target=target or native_target())
+# ---------------------------------------------------------------- which compiler
 
 
 def own_compiler() -> Compiler:
-    """Return the first compiler of this machine that works.
+    """Return the first compiler of this machine that works: the one that CC names, cc, gcc, clang.
 
     Raises:
         BuildError: none does; says why.
     """
+    named = shlex.split(os.environ.get("CC", ""))
+    usual = [[path] for path in map(shutil.which, ("cc", "gcc", "clang")) if path]
     failures = []
-    for compiler in own_compilers():
+    for command in ([named] if named else []) + usual:
+        compiler = _compiler(tuple(command))
         failure = failure_of(compiler)
         if not failure:
             return compiler
         failures.append(f"{compiler.name}: {failure}")
     raise BuildError(f"no C compiler works here ({'; '.join(failures) or 'cc, gcc and clang are not found'})")
+
+
+def zig(target: str = "") -> Compiler:
+    """Return Zig from PyPI as a compiler for a target, by default for this machine.
+
+    Raises:
+        BuildError: it is not installed.
+    """
+    found = find_spec("ziglang")
+    if found is None or found.origin is None:
+        raise BuildError(f"{ZIGLANG} is not installed")
+    return _compiler((str(Path(found.origin).with_name("zig")), "cc"), target)
 
 
 def any_compiler() -> Compiler:
@@ -201,44 +222,56 @@ def requirements() -> list[str]:
         own_compiler()
     except BuildError:
         target = _compiler(())
-        known = target.machine in _SETS and target.system in ("linux", "macos", "windows")
-        return [ZIGLANG] if known else []
+        runs_here = target.machine in _SETS and sys.platform in ("linux", "darwin", "win32")
+        return [ZIGLANG] if runs_here else []
     return []
 
 
+def _compiler(command: tuple[str, ...], target: str = "") -> Compiler:
+    return Compiler(command=command, target=target or native_target())
+
+
 def failure_of(compiler: Compiler) -> str:
-    """Return why a compiler cannot make the library for this Python; nothing where it can make a tiny one."""
+    """Return why a compiler cannot make a library for this Python; nothing where it makes a tiny one that opens."""
     with tempfile.TemporaryDirectory() as folder:
-        tiny = Path(folder, "tiny.c")
-        tiny.write_text(_TINY, encoding="utf-8")
-        library = Path(folder, library_name())
+        source, library = Path(folder, "tiny.c"), Path(folder, library_name())
+        source.write_text(_TINY, encoding="utf-8")
+        objects = {Path(folder, f"{name}.o"): flags for name, flags in compiler.instruction_sets.items()}
         try:
-            objects = [Path(folder, f"tiny-{name}.o") for name in compiler.instruction_sets]
-            for name, file in zip(compiler.instruction_sets, objects, strict=True):
-                _call(
-                    [
-                        *compiler.command,
-                        *_COMMON,
-                        *compiler.flags(),
-                        *_set_flags(compiler, name),
-                        "-c",
-                        tiny,
-                        "-o",
-                        file,
-                    ]
-                )
-            _call([*compiler.command, *compiler.flags(), objects[0], *compiler.library_flags(), "-o", library])
-            _call([sys.executable, "-c", _OPEN, library])
+            for made, flags in objects.items():
+                compiler.compile(source, made, *flags)
+            compiler.link([*objects][:1], library)
+            _run([sys.executable, "-c", _OPEN, str(library)])
         except BuildError as error:
             return str(error)
     return ""
+
+
+# ---------------------------------------------------------------- the library
+
+
+def fingerprint() -> str:
+    """Return 16 digits that change with any file of the sources, and with this one."""
+    digest = hashlib.sha256()
+    for file in (Path(__file__), *sorted(SOURCES.glob("*.[ch]"))):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def is_current(library: Path) -> bool:
+    """Return whether a file opens here as a library that was built from the sources as they are."""
+    try:
+        _run([sys.executable, "-c", _READ, str(library), fingerprint()])
+    except BuildError:
+        return False
+    return True
 
 
 def build(
     library: Path,
     compiler: Compiler | None = None,
     *,
-    sources: Iterable[Path] | None = None,
+    also: Sequence[Path] = (),
     instruction_sets: Sequence[str] | None = None,
     flags: Sequence[str] = (),
 ) -> Path:
@@ -247,7 +280,7 @@ def build(
     Args:
         library: its file, replaced where it exists.
         compiler: by default the first that works here.
-        sources: the C files; by default all of the package.
+        also: C files beside those of the package.
         instruction_sets: those that the kernels are compiled for; by default all of the compiler's machine.
         flags: more arguments, for each file and for the library.
 
@@ -255,38 +288,27 @@ def build(
         BuildError: there is no compiler, or it fails.
     """
     compiler = compiler or any_compiler()
-    files = sorted(SOURCES.glob("*.c")) if sources is None else list(sources)
-    sets = compiler.instruction_sets if instruction_sets is None else tuple(instruction_sets)
+    sets = {name: compiler.instruction_sets[name] for name in instruction_sets or compiler.instruction_sets}
+    shared = [*(f"-DMT_WITH_{name.upper()}" for name in sets), f'-DMT_FINGERPRINT="{fingerprint()}"', *flags]
     with tempfile.TemporaryDirectory() as folder:
-        made = Path(folder, library.name)
         units = [
-            (file, name, Path(folder, f"{file.stem}-{name}.o"))
-            for file in files
-            for name in (sets if file.stem.endswith("_kernel") else ("",))
-        ]
-        shared = [*_COMMON, f"-I{SOURCES}", f'-DMT_FINGERPRINT="{fingerprint()}"']
-        shared += [*(f"-DMT_WITH_{name.upper()}" for name in sets), *compiler.flags(), *flags]
-        commands = [
-            [*compiler.command, *shared, *_file_flags(compiler, file, name), "-c", file, "-o", made_object]
-            for file, name, made_object in units
+            (file, Path(folder, f"{file.stem}-{number}.o"), more)
+            for file in (*sorted(SOURCES.glob("*.c")), *also)
+            for number, more in enumerate(_variants(file, sets))
         ]
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            list(pool.map(_call, commands))
-        objects = [made_object for _, _, made_object in units]
-        _call([*compiler.command, *compiler.flags(), *flags, *objects, *compiler.library_flags(), "-o", made])
+            list(pool.map(lambda unit: compiler.compile(unit[0], unit[1], *unit[2], *shared), units))
+        made = Path(folder, library.name)
+        compiler.link([unit[1] for unit in units], made, *flags)
         return _put(made, library)
 
 
-def _file_flags(compiler: Compiler, file: Path, instruction_set: str) -> list[str]:
-    contract = "off" if file.stem.startswith(_UNFUSED) else "fast"
-    flags = [f"-ffp-contract={contract}"]
-    if instruction_set:
-        flags += [f"-DMT_SET_{instruction_set.upper()}", *_set_flags(compiler, instruction_set)]
-    return flags
-
-
-def _set_flags(compiler: Compiler, instruction_set: str) -> tuple[str, ...]:
-    return _SETS.get(compiler.machine, _OTHER_MACHINE)[instruction_set]
+def _variants(file: Path, sets: Mapping[str, tuple[str, ...]]) -> list[list[str]]:
+    """Return the flags of a file, for every time that it is compiled."""
+    contraction = f"-ffp-contract={'off' if file.stem.startswith(_UNFUSED) else 'fast'}"
+    if not file.stem.endswith("_kernel"):
+        return [[contraction]]
+    return [[contraction, f"-DMT_SET_{name.upper()}", *flags] for name, flags in sets.items()]
 
 
 def _put(made: Path, library: Path) -> Path:
@@ -298,12 +320,13 @@ def _put(made: Path, library: Path) -> Path:
     except OSError as error:
         raise BuildError(f"the library cannot be written to '{library}' ({error})") from None
     finally:
-        beside.unlink(missing_ok=True)
+        with suppress(OSError):
+            beside.unlink()
     return library
 
 
-def _call(command: Sequence[str | Path]) -> None:
-    """Run a command; the last line that says error is the reason when it fails."""
+def _run(command: Sequence[str], **environment: str) -> None:
+    """Run a command; when it fails, the first line with `error:` is the reason."""
     try:
         ended = subprocess.run(
             command,
@@ -311,11 +334,12 @@ def _call(command: Sequence[str | Path]) -> None:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             timeout=_TIMEOUT,
+            env={**os.environ, **environment},
             check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise BuildError(f"{error}") from None
+        raise BuildError(str(error)) from None
     if ended.returncode:
         lines = ended.stdout.decode(errors="replace").strip().splitlines()
-        said = [line for line in lines if "error" in line.lower()] or lines[-1:]
+        said = [line for line in lines if "error:" in line.lower()] or lines[-1:]
         raise BuildError(said[0].strip() if said else f"{command[0]} ended with {ended.returncode}")

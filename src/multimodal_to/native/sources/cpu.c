@@ -25,22 +25,28 @@ enum {
 };
 #define LEAF7_EBX_AVX512VL (1u << 31)
 
-static unsigned saved_registers(void) {
+static int has(unsigned word, unsigned bits) { return (word & bits) == bits; }
+
+/* Return the largest set by what CPUID says of its leaves 1 and 7, and the register XCR0 where there is one. */
+MT_EXPORT int mt_set_of_processor(unsigned leaf1_ecx, unsigned leaf7_ebx, unsigned xcr0) {
+  if (!has(leaf1_ecx, LEAF1_ECX_OSXSAVE | LEAF1_ECX_AVX | LEAF1_ECX_FMA)) return MT_SSE2;
+  if (!has(xcr0, XCR0_YMM) || !has(leaf7_ebx, LEAF7_EBX_AVX2)) return MT_SSE2;
+  if (!has(xcr0, XCR0_ZMM)) return MT_AVX2;
+  return has(leaf7_ebx, LEAF7_EBX_AVX512F | LEAF7_EBX_AVX512DQ | LEAF7_EBX_AVX512VL) ? MT_AVX512 : MT_AVX2;
+}
+
+static unsigned read_xcr0(void) {
   unsigned low, high;
   __asm__ volatile("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
   (void)high;
   return low;
 }
 
-static int has(unsigned word, unsigned bits) { return (word & bits) == bits; }
-
-static int largest_of_the_processor(void) {
-  unsigned a, b, c, d;
-  if (!__get_cpuid(1, &a, &b, &c, &d) || !has(c, LEAF1_ECX_OSXSAVE | LEAF1_ECX_AVX | LEAF1_ECX_FMA)) return MT_SSE2;
-  unsigned saved = saved_registers();
-  if (!has(saved, XCR0_YMM) || !__get_cpuid_count(7, 0, &a, &b, &c, &d) || !has(b, LEAF7_EBX_AVX2)) return MT_SSE2;
-  if (!has(saved, XCR0_ZMM) || !has(b, LEAF7_EBX_AVX512F | LEAF7_EBX_AVX512DQ | LEAF7_EBX_AVX512VL)) return MT_AVX2;
-  return MT_AVX512;
+static int largest_of_this_processor(void) {
+  unsigned a, b, c1, d, b7 = 0, c7;
+  if (!__get_cpuid(1, &a, &b, &c1, &d)) return MT_SSE2;
+  if (!__get_cpuid_count(7, 0, &a, &b7, &c7, &d)) b7 = 0;
+  return mt_set_of_processor(c1, b7, has(c1, LEAF1_ECX_OSXSAVE) ? read_xcr0() : 0);
 }
 
 static int asked_for(void) {
@@ -61,7 +67,7 @@ static int in_the_library(int set) {
 }
 
 static int find(void) {
-  int able = largest_of_the_processor(), asked = asked_for();
+  int able = largest_of_this_processor(), asked = asked_for();
   return in_the_library(asked < able ? asked : able);
 }
 #elif defined(MT_WITH_NEON)
