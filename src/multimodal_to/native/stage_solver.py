@@ -52,7 +52,7 @@ class Counts:
 
 
 class _Counts(ctypes.Structure):
-    _fields_ = [(field.name, ctypes.c_double) for field in fields(Counts)]  # noqa: RUF012 - what ctypes asks for
+    _fields_ = [(field.name, ctypes.c_double) for field in fields(Counts)]
 
 
 class StageSolver:

@@ -1,12 +1,17 @@
-"""What the structured linear solver is told of a problem: which variable is of which knot."""
+"""The structured linear solver: what it is told of a problem, and how IPOPT comes to it."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from multimodal_to import native
 from multimodal_to.adam.spatial import Array
-from multimodal_to.native.stage_solver import KktStructure
+from multimodal_to.native.stage_solver import KktStructure, StageSolver
 from multimodal_to.ocp.problem import Problem
 
 OF_NO_KNOT = -1
@@ -19,9 +24,12 @@ def variable_knots(problem: Problem) -> NDArray[np.int32]:
     return np.append(knots, OF_NO_KNOT).astype(np.int32)
 
 
-def structure(
-    knots: NDArray[np.int32], lower: Array, upper: Array, row_lower: Array, row_upper: Array
-) -> KktStructure:
+def structure_of(problem: Problem) -> KktStructure:
+    """Return the structure of the KKT matrix of a problem."""
+    return structure(variable_knots(problem), problem.lower, problem.upper, problem.row_lower, problem.row_upper)
+
+
+def structure(knots: NDArray[np.int32], lower: Array, upper: Array, row_lower: Array, row_upper: Array) -> KktStructure:
     """Return the structure of IPOPT's KKT matrix.
 
     IPOPT leaves out variables with equal bounds; rows with equal bounds are equations, all others have a slack.
@@ -40,3 +48,40 @@ def structure(
         inequalities=row_lower.size - equalities,
         equalities=equalities,
     )
+
+
+@contextmanager
+def offered(options: Mapping[str, Any], structure: KktStructure) -> Iterator[StageSolver | None]:
+    """Let the solve of IPOPT that begins in this thread use the structured solver, where its options ask for it.
+
+    Args:
+        options: of IPOPT.
+        structure: of its KKT matrix.
+
+    Yields:
+        The solver, or None where the options ask for another one.
+    """
+    library = native.library()
+    if library is None or options.get("hsllib") != library._name:
+        yield None
+        return
+    with StageSolver(library, structure) as solver, solver.announced():
+        yield solver
+
+
+def failure(solver: StageSolver | None, status: str) -> str:
+    """Return in one sentence why a solve has to be done again with another linear solver; nothing where it has not.
+
+    Args:
+        solver: that was offered.
+        status: how the solve ended, in IPOPT's words.
+    """
+    if solver is None:
+        return ""
+    if not solver.refusal and status in _NOT_TAKEN and not solver.counts.factorisations:
+        return f"IPOPT did not take the native library for an HSL one ({status})"
+    return solver.refusal
+
+
+_NOT_TAKEN = ("Dynamic_Library_Failure", "Invalid_Option", "Unrecoverable_Exception", "Internal_Error")
+"""How IPOPT ends where it cannot load a linear solver."""
