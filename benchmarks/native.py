@@ -47,10 +47,11 @@ NOT_SANITIZED = ("test_compiling.py", "test_wheel.py", "test_without.py")
 
 
 def compiled(compiler: compiling.Compiler, folder: Path) -> str:
-    """Compile the library; return seconds and size."""
-    started = time.perf_counter()
+    """Compile the library; return seconds, those of the processor too, and size."""
+    started, used = time.perf_counter(), sum(os.times()[2:4])
     library = compiling.build(folder / compiling.library_name(compiler.target), compiler, flags=STRICT)
-    return f"{time.perf_counter() - started:5.1f} s, {library.stat().st_size / 1e3:.0f} kB"
+    seconds, used = time.perf_counter() - started, sum(os.times()[2:4]) - used
+    return f"{seconds:.1f} s ({used:.1f} s of processors), {library.stat().st_size / 1e3:.0f} kB"
 
 
 def compilers() -> bool:

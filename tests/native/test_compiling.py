@@ -117,6 +117,24 @@ def test_ziglang_is_asked_for_only_where_no_compiler_works(request, compiler):
     assert compiling.requirements() == expected
 
 
+@pytest.mark.parametrize(
+    ("system", "macos", "machine", "runs"),
+    [
+        ("linux", "", "x86_64", True),
+        ("linux", "", "riscv64", False),
+        ("freebsd14", "", "x86_64", False),
+        ("darwin", "14.2", "x86_64", True),
+        ("darwin", "11.7", "x86_64", False),
+    ],
+)
+def test_ziglang_is_not_asked_for_where_it_does_not_exist(monkeypatch, without_compiler, system, macos, machine, runs):
+    monkeypatch.setattr(sys, "platform", system)
+    monkeypatch.setattr(compiling.platform, "mac_ver", lambda: (macos, ("", "", ""), ""))
+    monkeypatch.setattr(compiling.platform, "machine", lambda: machine)
+    monkeypatch.setattr(compiling.sysconfig, "get_platform", lambda: f"{system}-{machine}")
+    assert compiling.requirements() == ([compiling.ZIGLANG] if runs else [])
+
+
 def test_without_any_compiler_a_sentence_says_what_was_looked_for(tmp_path, without_compiler):
     with pytest.raises(compiling.BuildError) as raised:
         compiling.build(tmp_path / "native.so")

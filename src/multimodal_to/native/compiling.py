@@ -30,6 +30,8 @@ _GLIBC = "2.17"
 """The oldest glibc that a library made by Zig loads with: that of manylinux2014, as CasADi's wheels."""
 _MACOS = "11.0"
 """The oldest macOS that a library loads on."""
+_ZIG_MACOS = 12
+"""The oldest macOS that Zig itself runs on."""
 _TIMEOUT = 600.0  # for one call of a compiler [s]; the first one of Zig compiles parts of the C library
 
 _COMMON = ("-std=gnu11", "-O3", "-fno-math-errno", "-fvisibility=hidden", f"-I{SOURCES}")
@@ -221,10 +223,15 @@ def requirements() -> list[str]:
     try:
         own_compiler()
     except BuildError:
-        target = _compiler(())
-        runs_here = target.machine in _SETS and sys.platform in ("linux", "darwin", "win32")
-        return [ZIGLANG] if runs_here else []
+        return [ZIGLANG] if _zig_runs_here() else []
     return []
+
+
+def _zig_runs_here() -> bool:
+    """Return whether PyPI has Zig for this machine; a build that asks for what does not exist would fail."""
+    if sys.platform == "darwin" and int(platform.mac_ver()[0].split(".")[0] or 0) < _ZIG_MACOS:
+        return False
+    return _compiler(()).machine in _SETS and sys.platform in ("linux", "darwin", "win32")
 
 
 def _compiler(command: tuple[str, ...], target: str = "") -> Compiler:
