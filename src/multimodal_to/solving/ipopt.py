@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError, SolverError
 from multimodal_to.ocp.problem import Problem
-from multimodal_to.solving import linear_solvers, machine
+from multimodal_to.solving import linear_solvers, machine, stages
 from multimodal_to.solving.solver import Ending, StartPoint, Watch
 from multimodal_to.solving.status import Status
 
@@ -79,7 +79,7 @@ class Ipopt:
     barrier_start: float = 0.1
     barrier_warm: float = 1e-3  # where a solve that starts from an answer begins
     linear_solver: str = linear_solvers.AUTO
-    """What factorises, one of `linear_solvers.LINEAR_SOLVERS`: by default an HSL solver that works, or MUMPS."""
+    """What factorises, one of `linear_solvers.LINEAR_SOLVERS`: by default the native library's `"stages"`, or MUMPS."""
     hsl_library: str = ""  # file of the HSL library; empty: looked for
 
     def __post_init__(self) -> None:
@@ -149,12 +149,23 @@ class Ipopt:
         Raises:
             SolverError: IPOPT could not be run, or its linear solver is not here.
         """
-        started, iterations, x = time.perf_counter(), 0, start.x
-        for which in _passes(start):
+        started, iterations, x, solver = time.perf_counter(), 0, start.x, self
+        facts: dict[str, Any] = {}
+        passes = list(_passes(start))
+        while passes:
+            which = passes[0]
             seconds = max(self.time_limit - (time.perf_counter() - started), 1e-3)
-            options = self.options(max(self.max_iterations - iterations, 1), seconds, which)
-            x, statistics = _run(problem, x, options, _Watcher(problem, watch, iterations, which))
+            options = solver.options(max(self.max_iterations - iterations, 1), seconds, which)
+            with stages.offered(options, stages.structure_of(problem)) as structured:
+                end, statistics = _run(problem, x, options, _Watcher(problem, watch, iterations, which))
+                failure = stages.failure(structured, str(statistics["return_status"]))
             iterations += int(statistics["iter_count"])
+            if failure:  # the same pass once more
+                solver = replace(self, linear_solver=linear_solvers.MUMPS)
+                facts = {"linear_solver": linear_solvers.MUMPS, "linear_solver_refused": failure}
+                continue
+            x = end
+            passes.pop(0)
             message = str(statistics["return_status"])
             status = self.status(message)
             if status in (Status.TIME_LIMIT, Status.STOPPED) or iterations >= self.max_iterations:
@@ -167,6 +178,7 @@ class Ipopt:
             label=which.value,
             tolerance=self.violation_tolerance,
             statistics=statistics,
+            facts=facts,
         )
 
 

@@ -13,12 +13,16 @@ from typing import Any
 
 import casadi as cs
 
+from multimodal_to import native
 from multimodal_to.errors import InputError, SolverError, unknown
 
 AUTO = "auto"
-"""The first of `_PREFERRED` that works, and MUMPS where none does."""
-LINEAR_SOLVERS = ("mumps", "spral", "ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "pardisomkl")
-"""The names that IPOPT knows them by."""
+"""`STAGES` where the native library is, else the first of `_PREFERRED` that works, and MUMPS where none does."""
+STAGES = "stages"
+"""The native library's own: it factorises along the horizon, and IPOPT takes it for MA27."""
+MUMPS = "mumps"
+LINEAR_SOLVERS = (STAGES, MUMPS, "spral", "ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "pardisomkl")
+"""Their names; all but the first are IPOPT's own."""
 HSL_VARIABLE = "MULTIMODAL_TO_HSL"
 """The environment variable with the path of an HSL library."""
 
@@ -61,12 +65,14 @@ class LinearSolver:
     """A linear solver that is here."""
 
     name: str  # one of `LINEAR_SOLVERS`
-    library: str = ""  # file of the HSL library that it comes from, if it does
+    library: str = ""  # file of the library that it comes from, where that is neither CasADi nor IPOPT
 
     def options(self) -> dict[str, Any]:
         """Return the options that make IPOPT use it."""
+        if self.name == STAGES:
+            return {"linear_solver": "ma27", "hsllib": self.library, "linear_system_scaling": "none"}
         options: dict[str, Any] = {"linear_solver": self.name}
-        if self.name == "mumps":
+        if self.name == MUMPS:
             options |= _MUMPS
         if self.library:
             options["hsllib"] = self.library
@@ -88,8 +94,9 @@ def check(name: str, hsl_library: str = "") -> None:
 def choose(name: str = AUTO, hsl_library: str = "") -> LinearSolver:
     """Return the linear solver of a name, or for `AUTO` the best one that is here.
 
-    MUMPS comes with CasADi and is not tried. All others are tried in a child process, which takes part of a second,
-    once in the life of this one; for `AUTO` only where there is an HSL library.
+    `STAGES` comes with this package and MUMPS with CasADi; they are not tried. All others are tried in a child process,
+    which takes part of a second, once in the life of this one; for `AUTO` only where there is an HSL library and no
+    native one.
 
     Args:
         name: `AUTO`, or one of `LINEAR_SOLVERS`.
@@ -99,14 +106,20 @@ def choose(name: str = AUTO, hsl_library: str = "") -> LinearSolver:
         InputError: the name is unknown, or the HSL library is no file.
         SolverError: the solver of that name is not here, or does not work.
     """
+    check(name, hsl_library)
+    own = native.library()
+    if own is not None and name in (AUTO, STAGES):
+        return LinearSolver(name=STAGES, library=own._name)
+    if name == STAGES:
+        raise SolverError(f"the linear solver '{STAGES}' cannot be used: {native.missing()}; 'mumps' needs nothing")
     takes_hsl = name == AUTO or _is_hsl(name)
     named = hsl_library or os.environ.get(HSL_VARIABLE, "") if takes_hsl else ""
     check(name, named)
     library = named or (next(_hsl_libraries(), "") if takes_hsl else "")
     if name == AUTO:
         works = (LinearSolver(name=hsl, library=library) for hsl in _PREFERRED if library and not _trial(hsl, library))
-        return next(works, LinearSolver(name="mumps"))
-    failure = "" if name == "mumps" else _trial(name, library)
+        return next(works, LinearSolver(name=MUMPS))
+    failure = "" if name == MUMPS else _trial(name, library)
     if failure:
         raise SolverError(f"the linear solver '{name}' cannot be used, {failure}; {_advice(name, library)}")
     return LinearSolver(name=name, library=library)

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError, unknown
+from multimodal_to.native.stage_solver import KktStructure
 from multimodal_to.ocp.problem import Problem
-from multimodal_to.solving import machine
+from multimodal_to.solving import linear_solvers, machine, stages
 from multimodal_to.solving.ipopt import Ipopt, Pass
 from multimodal_to.solving.motion import motion
 from multimodal_to.solving.status import Status
@@ -117,22 +118,50 @@ class _Elastic:
         return amounts[:rows], {name: amounts[rows:][place] for name, place in self.bound_terms.items()}
 
 
-@machine.one_blas_thread()
-@machine.memory_kept()
+def _structure(problem: Problem, elastic: _Elastic) -> KktStructure:
+    """Return the structure of the relaxed problem's KKT matrix: s⁺ and s⁻ are of the knots of their rows."""
+    row_knots = np.zeros(elastic.lower.size, dtype=np.int32)
+    for rows in problem.rows.values():
+        row_knots[rows.index] = rows.knots
+    for name, place in elastic.bound_terms.items():
+        row_knots[problem.row_lower.size :][place] = problem.bound_rows[name].knots
+    slack_knots = row_knots[elastic.chosen]
+    return stages.structure(
+        np.concatenate([stages.variable_knots(problem), slack_knots, slack_knots]),
+        np.concatenate([elastic.x_lower, np.zeros(2 * slack_knots.size)]),
+        np.concatenate([elastic.x_upper, np.full(2 * slack_knots.size, np.inf)]),
+        elastic.lower,
+        elastic.upper,
+    )
+
+
 def _run(problem: Problem, elastic: _Elastic, start: Array, solver: Ipopt) -> tuple[Array, Array, dict[str, Any]]:
     """Solve the relaxed problem; return x, s⁺ + s⁻ of the chosen rows, and the solver's statistics."""
-    count, chosen = start.size, elastic.chosen
     own = replace(solver, objective_scale=1.0, tolerance=1e-6)
+    options = own.options(solver.max_iterations, solver.time_limit, Pass.EXACT)
+    with stages.offered(options, _structure(problem, elastic)) as structured:
+        found = _minimised(problem, elastic, start, options)
+        failed = stages.failure(structured, str(found[2]["return_status"]))
+    return _run(problem, elastic, start, replace(solver, linear_solver=linear_solvers.MUMPS)) if failed else found
+
+
+@machine.one_blas_thread()
+@machine.memory_kept()
+def _minimised(
+    problem: Problem, elastic: _Elastic, start: Array, options: dict[str, Any]
+) -> tuple[Array, Array, dict[str, Any]]:
+    """Solve the relaxed problem with given options of IPOPT."""
+    count, chosen = start.size, elastic.chosen
     nlp, derivatives = _relaxed(problem, elastic, start)
-    options = {
+    settings = {
         "print_time": False,
         "no_nlp_grad": True,  # for the multipliers of parameters, of which there are none
         "calc_lam_p": False,
         "error_on_fail": False,
-        "ipopt": own.options(solver.max_iterations, solver.time_limit, Pass.EXACT),
+        "ipopt": options,
         **derivatives,
     }
-    function = cs.nlpsol("relaxed", "ipopt", nlp, options)
+    function = cs.nlpsol("relaxed", "ipopt", nlp, settings)
     at_start = np.concatenate([problem.rows_at(start), start[elastic.bound_index]])[chosen]
     lower, upper = elastic.lower[chosen], elastic.upper[chosen]
     result = function(

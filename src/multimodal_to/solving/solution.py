@@ -105,6 +105,7 @@ def solve(
     with Interrupts() as interrupts:
         watch = _Watch(problem, best, progress, started, interrupts)
         ending = _run(solver, problem, point, watch)
+    environment |= ending.facts
     status = Status.STOPPED if interrupts.asked else ending.status
     end = best.end(ending.x, ending.iterations, ending.label, answer=status.solved)
     if status.solved and end.violation > max(FEASIBLE, ending.tolerance):  # whatever the solver says

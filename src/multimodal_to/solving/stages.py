@@ -1,0 +1,87 @@
+"""The structured linear solver: what it is told of a problem, and how IPOPT comes to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from multimodal_to import native
+from multimodal_to.adam.spatial import Array
+from multimodal_to.native.stage_solver import KktStructure, StageSolver
+from multimodal_to.ocp.problem import Problem
+
+OF_NO_KNOT = -1
+"""What stands for the knot of a variable of the whole horizon, as Δt."""
+
+
+def variable_knots(problem: Problem) -> NDArray[np.int32]:
+    """Return the knot of each variable of a problem, and `OF_NO_KNOT` of Δt."""
+    knots = np.repeat(np.arange(problem.scenario.knots + 1), problem.layout.size)
+    return np.append(knots, OF_NO_KNOT).astype(np.int32)
+
+
+def structure_of(problem: Problem) -> KktStructure:
+    """Return the structure of the KKT matrix of a problem."""
+    return structure(variable_knots(problem), problem.lower, problem.upper, problem.row_lower, problem.row_upper)
+
+
+def structure(knots: NDArray[np.int32], lower: Array, upper: Array, row_lower: Array, row_upper: Array) -> KktStructure:
+    """Return the structure of IPOPT's KKT matrix.
+
+    IPOPT leaves out variables with equal bounds; rows with equal bounds are equations, all others have a slack.
+
+    Args:
+        knots: of each variable, `OF_NO_KNOT` for those of the whole horizon.
+        lower: bounds of the variables.
+        upper: likewise.
+        row_lower: bounds of the rows.
+        row_upper: likewise.
+    """
+    equalities = int((row_lower == row_upper).sum())
+    return KktStructure(
+        knots=int(knots.max(initial=0)) + 1,
+        variable_knots=knots[lower < upper],
+        inequalities=row_lower.size - equalities,
+        equalities=equalities,
+    )
+
+
+@contextmanager
+def offered(options: Mapping[str, Any], structure: KktStructure) -> Iterator[StageSolver | None]:
+    """Let the solve of IPOPT that begins in this thread use the structured solver, where its options ask for it.
+
+    Args:
+        options: of IPOPT.
+        structure: of its KKT matrix.
+
+    Yields:
+        The solver, or None where the options ask for another one.
+    """
+    library = native.library()
+    if library is None or options.get("hsllib") != library._name:
+        yield None
+        return
+    with StageSolver(library, structure) as solver, solver.announced():
+        yield solver
+
+
+def failure(solver: StageSolver | None, status: str) -> str:
+    """Return in one sentence why a solve has to be done again with another linear solver; nothing where it has not.
+
+    Args:
+        solver: that was offered.
+        status: how the solve ended, in IPOPT's words.
+    """
+    if solver is None:
+        return ""
+    if not solver.refusal and status in _NOT_TAKEN and not solver.counts.factorisations:
+        return f"IPOPT did not take the native library for an HSL one ({status})"
+    return solver.refusal
+
+
+_NOT_TAKEN = ("Dynamic_Library_Failure", "Invalid_Option", "Unrecoverable_Exception", "Internal_Error")
+"""How IPOPT ends where it cannot load a linear solver."""
