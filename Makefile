@@ -5,6 +5,8 @@ RESULTS := results/take-off
 INSTALL := $(BIN)/python -m pip install --quiet --constraint constraints.txt
 # One process of the tests for each core. More than four need much memory and wait for the longest tests.
 WORKERS := --numprocesses logical --maxprocesses 4 --dist worksteal
+# What the native library is compiled from; it is compiled when the package is installed.
+NATIVE := $(wildcard src/multimodal_to/native/sources/*.[ch]) src/multimodal_to/native/compiling.py
 OLDEST := .venv-oldest
 # The core: what depends on casadi and numpy. Peers are left out, their own oldest versions are not ours to test.
 OLDEST_TESTS := tests/adam/test_adam_physics.py tests/adam/test_adam_urdf.py tests/test_properties.py \
@@ -44,7 +46,7 @@ docs: .venv/ready-docs
 clean:
 	rm -rf .venv .venv-oldest .venv-constraints results site
 
-.venv/ready: pyproject.toml constraints.txt
+.venv/ready: pyproject.toml constraints.txt hatch_build.py $(NATIVE)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "Python 3.11 or newer is needed; run: make $(MAKECMDGOALS) PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv .venv
@@ -62,7 +64,7 @@ clean:
 	$(INSTALL) --group docs
 	touch $@
 
-$(OLDEST)/ready: pyproject.toml oldest.txt
+$(OLDEST)/ready: pyproject.toml oldest.txt hatch_build.py $(NATIVE)
 	$(PYTHON) -m venv $(OLDEST)
 	$(OLDEST)/bin/python -m pip install --quiet --upgrade "pip>=25.1"
 	$(OLDEST)/bin/python -m pip install --quiet --constraint oldest.txt --editable . --group core

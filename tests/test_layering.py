@@ -13,7 +13,7 @@ import multimodal_to
 ROOT = Path(multimodal_to.__file__).parent
 FLOORS = [
     {"errors"},
-    {"files"},
+    {"files", "native"},
     {"adam"},
     {"models"},
     {"trajectory"},

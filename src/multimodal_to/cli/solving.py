@@ -35,6 +35,7 @@ from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
 from multimodal_to.errors import InputError, ScenarioError
 from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.native import missing
 from multimodal_to.ocp import Formulation, build
 from multimodal_to.ocp import precompile as compile_problem
 from multimodal_to.ocp.integration import LEAPFROG
@@ -229,6 +230,8 @@ def solve(
         f"linear solver {chosen_solver.name}",
         soft_wrap=True,
     )
+    if without := missing():
+        console.print(f"warning: the solve takes longer, as {without}", soft_wrap=True)
     expectation = expect(scenario) if task.start is None and not paper else None
     if expectation is not None:
         console.print(f"{expectation}", soft_wrap=True)

@@ -10,6 +10,7 @@ from typing import Any
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import SolverError
+from multimodal_to.native import instruction_set
 from multimodal_to.ocp.problem import Problem
 from multimodal_to.solving import machine
 from multimodal_to.solving.best import Best, Checkpoint
@@ -55,7 +56,7 @@ class Solution:
     feasible: bool
     unmet: tuple[Violation, ...] = field(repr=False)  # terms and bounds that are not met, the worst first
     solve_time: float  # wall time in the solver [s]
-    statistics: dict[str, Any] = field(repr=False)  # the solver's own, `compiled`, `threads` and `versions`
+    statistics: dict[str, Any] = field(repr=False)  # the solver's own, and what the answer depends on
 
     @property
     def largest_violation(self) -> tuple[str, float, str]:
@@ -146,6 +147,7 @@ def _environment(problem: Problem, solver: Solver) -> dict[str, Any]:
         **solver.facts,
         "formulation": problem.formulation.described(),
         "compiled": problem.nlp.compiled,
+        "native": instruction_set(),
         "threads": threads,
         "versions": machine.versions(),
     }
