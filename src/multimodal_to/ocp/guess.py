@@ -24,6 +24,9 @@ PLACES_WEIGHT = 30.0
 _TILT_MAX = 0.6
 """How far the base may turn from home about each axis to stand on a slope [rad]."""
 
+LANDED = 0.4
+"""Share of the horizon in which a motion from the air to the ground comes down [1]."""
+
 
 def standing_posture(robot: Robot, surface: Surface, com: Vector3) -> Posture:
     """Return the posture nearest to home with every contact point on the ground and the CoM at `com` [m].
@@ -115,6 +118,11 @@ def contact_positions(robot: Robot, posture: Posture) -> Array:
     return np.concatenate(points) if points else np.zeros(0)
 
 
+def com_position(robot: Robot, posture: Posture) -> Array:
+    """Return the CoM of a posture in the world [m], (3,)."""
+    return np.array(robot.kindyn.CoM_position(base_transform(posture), posture.joint_positions)).ravel()
+
+
 def base_transform(posture: Posture) -> Array:
     """Return w_H_base of a posture, (4, 4)."""
     return posture.base_transform
@@ -124,9 +132,10 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     """Return the start guess of every knot, (layout size, N + 1), in the variables' own units.
 
     The standing posture moves with the CoM on the straight line from start to end. The contact points go along in x and
-    y, or step `guess_steps` times. Contact forces carry the weight; a motion that starts in the air hands it over to
-    them linearly from the thrusts, one that walks into the air the other way round. A robot without jets that has to be
-    high at mid-horizon is thrown there. Everything else is zero.
+    y, or step `guess_steps` times; they follow the ground, or fly along with a robot that starts in the air. Contact
+    forces carry the weight, unless thrusts do (`_weight_flown`). A motion from the air to the ground comes down in the
+    first `LANDED` of its knots, which leaves the turbines time to slow down. A robot without jets that has to be high
+    at mid-horizon is thrown there. Everything else is zero.
 
     Args:
         robot: with the jets that the scenario uses.
@@ -136,11 +145,12 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     """
     knots = scenario.knots + 1
     start, end = np.array(scenario.initial_com), np.array(scenario.final_com)
-    travelled = (end - start)[:, None] * np.linspace(0.0, 1.0, knots)
+    travelled = (end - start)[:, None] * _progress(scenario)
     guess = np.zeros((layout.size, knots))
     view = layout.read(guess)
     view["com_position"][:] = start[:, None] + travelled
-    view["base_position"][:] = standing.base_position[:, None] + travelled
+    away = view["com_position"] - com_position(robot, standing)[:, None]  # of the posture from where it stands
+    view["base_position"][:] = standing.base_position[:, None] + away
     view["base_quaternion_xyzw"][:] = standing.base_quaternion_xyzw[:, None]
     view["joint_positions"][:] = standing.joint_positions[:, None]
 
@@ -148,9 +158,12 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     _set_jets(robot, scenario, view, flown)
     feet = [contact.foot for contact in robot.contacts]
     moved, shares = steps(feet, robot.gait, scenario, travelled) if scenario.guess_steps else _glide(feet, travelled)
-    points = contact_positions(robot, standing).reshape(-1, 3, 1) + moved
-    ground = heights_below(scenario.surface, points.transpose(1, 0, 2).reshape(3, -1)).reshape(-1, knots)
-    points[:, 2] += ground - ground[:, :1]
+    moved = moved + away[:, :1] * np.array([[1.0], [1.0], [0.0]])
+    stands = contact_positions(robot, standing).reshape(-1, 3, 1)
+    points = stands + moved
+    points[:, 2] += _ground(scenario, points) - _ground(scenario, stands)
+    if scenario.start is Start.HOVER:
+        points[:, 2] = np.maximum(points[:, 2], (stands + away)[:, 2])  # the feet fly along
     if scenario.mid_height_min is not None and not robot.jets:
         rise, speed = hop(robot, scenario, view["com_position"][2])
         for name in ("com_position", "base_position"):
@@ -179,11 +192,32 @@ def hop(robot: Robot, scenario: Scenario, heights: Array) -> tuple[Array, Array]
     return rise, np.where(rise > 0.0, -gravity * times, 0.0)
 
 
+def _progress(scenario: Scenario) -> Array:
+    """Return which share of the way is behind the robot at every knot, (N + 1,); one that lands is there early."""
+    share = np.linspace(0.0, 1.0, scenario.knots + 1)
+    lands = scenario.start is Start.HOVER and scenario.terminal is Terminal.STANDING
+    return np.minimum(share / LANDED, 1.0) if lands else share
+
+
 def _weight_flown(robot: Robot, scenario: Scenario) -> Array:
-    """Return the share of the weight that the thrusts carry at every knot, (N + 1,): rising on a walk into the air."""
-    first = float(scenario.start is Start.HOVER and bool(robot.jets))
-    last = float(scenario.terminal is Terminal.HOVER and bool(robot.jets) and scenario.guess_steps > 0)
-    return np.linspace(first, last, scenario.knots + 1)
+    """Return the share of the weight that the thrusts carry at every knot, (N + 1,).
+
+    All of it for a motion that starts in the air, until it has landed; from there on they hand it over. On a walk into
+    the air they take it over. Otherwise the feet carry it.
+    """
+    share = np.linspace(0.0, 1.0, scenario.knots + 1)
+    if not robot.jets:
+        return np.zeros_like(share)
+    if scenario.start is Start.HOVER:
+        lands = scenario.terminal is Terminal.STANDING
+        return np.minimum((1.0 - share) / (1.0 - LANDED), 1.0) if lands else np.ones_like(share)
+    return share if scenario.terminal is Terminal.HOVER and scenario.guess_steps else np.zeros_like(share)
+
+
+def _ground(scenario: Scenario, points: Array) -> Array:
+    """Return the height of the ground below points (count, 3, knots), (count, knots)."""
+    count, _, knots = points.shape
+    return heights_below(scenario.surface, points.transpose(1, 0, 2).reshape(3, -1)).reshape(count, knots)
 
 
 def _set_jets(robot: Robot, scenario: Scenario, view: dict[str, Array], flown: Array) -> None:
