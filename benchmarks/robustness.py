@@ -2,10 +2,11 @@
 
     python benchmarks/robustness.py [SCENARIO ...] [--variations 10] [--seed 1] [--workers 2]
 
-Every variation changes all of them at once: the target's height by up to ±0.05 m; the distance, where there is one,
-by up to ±0.2 m (the step and the place on it by ±0.1 m); the friction within 0.25 to 0.6; every mass and inertia by up
-to ±3 %; every joint of the posture that the robot stands near by up to ±0.05 rad, within its range. Each is solved from
-the plain start guess with default options, and audited. One line each, then a table.
+Every variation changes all of them at once: the target's height by up to ±0.05 m (the jump, which is as high as the
+motors can, by down to −0.05 m); the distance, where there is one, by up to ±0.2 m (the step and the place on it by
+±0.1 m); the friction within 0.25 to 0.6; every mass and inertia by up to ±3 %; every joint of the posture that the
+robot stands near by up to ±0.05 rad, within its range. Each is solved from the plain start guess with default options,
+and audited. One line each, then a table.
 """
 
 from __future__ import annotations
@@ -60,6 +61,8 @@ def vary(name: str, index: int, seed: int) -> tuple[Robot, Scenario, str]:
     posture = np.clip(home.joint_positions + turns, limits.lower, limits.upper)
     robot = replace(robot, home=replace(home, joint_positions=posture))
     scenario = replace(scenarios.find(name), friction=friction)
+    if not scenario.jets:
+        height = -abs(height)  # the jump is as high as the motors can
     drawn = f"height {height:+.3f} m, friction {friction:.2f}, mass {mass:.3f}"
     if scenario.mid_height_min is not None:
         return robot, replace(scenario, mid_height_min=scenario.mid_height_min + height), drawn

@@ -12,7 +12,7 @@ from multimodal_to import scenarios
 from multimodal_to.auditing import PROPERTIES, Of
 from multimodal_to.auditing.audit import audit
 from multimodal_to.auditing.findings import Motion
-from multimodal_to.auditing.margins import GLIDE_HEIGHT, GLIDE_SPEED, margin_findings, pressure_shares
+from multimodal_to.auditing.margins import GLIDE_DISTANCE, GLIDE_HEIGHT, margin_findings, pressure_shares
 from multimodal_to.auditing.properties import judged
 from multimodal_to.models.contact import DESCENT_RATE
 from multimodal_to.models.sole import PRESSURE_SLACK, Sole, soles
@@ -185,21 +185,21 @@ def test_a_foot_that_falls_to_the_ground_is_found_where_it_lands(ironcub):
 def test_a_foot_that_skims_the_ground_is_found_and_one_that_is_lifted_is_not(ironcub, rule):
     scenario = task(torque=0.9)
     way = np.zeros(KNOTS + 1)
-    way[KNOT:] = 0.02  # in one interval: 0.2 m/s
+    way[KNOT - 1 :], way[KNOT:] = 0.01, 0.03  # in two intervals
     low, high = (share * GLIDE_HEIGHT * ironcub.standing_height for share in (0.5, 1.5))
-    worst = found(ironcub, moved(ironcub, way, low, load=0.0, rule=rule), scenario)["gliding speed"]
-    assert worst.worst == pytest.approx(0.2)
-    assert worst.knot == KNOT
-    assert worst.worst > PROPERTIES["gliding speed"].limit_for(ironcub, scenario)
-    assert found(ironcub, moved(ironcub, way, high, load=0.0, rule=rule), scenario)["gliding speed"].worst == 0.0
-    assert found(ironcub, moved(ironcub, way, low, load=1.0, rule=rule), scenario)["gliding speed"].worst == 0.0
+    worst = found(ironcub, moved(ironcub, way, low, load=0.0, rule=rule), scenario)["gliding distance"]
+    assert worst.worst == pytest.approx(0.03)
+    assert worst.knot >= KNOT
+    assert worst.worst > PROPERTIES["gliding distance"].limit_for(ironcub, scenario)
+    assert found(ironcub, moved(ironcub, way, high, load=0.0, rule=rule), scenario)["gliding distance"].worst == 0.0
+    assert found(ironcub, moved(ironcub, way, low, load=1.0, rule=rule), scenario)["gliding distance"].worst == 0.0
 
 
 def test_a_foot_that_is_lifted_or_set_down_over_an_interval_does_not_glide(ironcub):
     way, height = np.zeros(KNOTS + 1), np.zeros(KNOTS + 1)
     way[KNOT:], way[KNOT + 1 :] = 0.02, 0.04
     height[KNOT] = 2.0 * GLIDE_HEIGHT * ironcub.standing_height  # up in one interval, down in the next
-    assert found(ironcub, moved(ironcub, way, height, load=0.0), task(torque=0.9))["gliding speed"].worst == 0.0
+    assert found(ironcub, moved(ironcub, way, height, load=0.0), task(torque=0.9))["gliding distance"].worst == 0.0
 
 
 def test_a_foot_that_stands_when_an_interval_begins_does_not_glide_over_it(ironcub):
@@ -207,11 +207,19 @@ def test_a_foot_that_stands_when_an_interval_begins_does_not_glide_over_it(ironc
     way, load = np.zeros(KNOTS + 1), np.zeros(KNOTS + 1)
     way[KNOT:] = 0.02
     load[KNOT - 1] = 2.0 * loaded_force(ironcub) * len(ironcub.contacts) / ironcub.weight
-    speeds = {
-        rule: found(ironcub, moved(ironcub, way, load=load, rule=rule), task(torque=0.9))["gliding speed"].worst
+    ways = {
+        rule: found(ironcub, moved(ironcub, way, load=load, rule=rule), task(torque=0.9))["gliding distance"].worst
         for rule in (rules.BACKWARD_EULER, rules.LEAPFROG)
     }
-    assert speeds == {rules.BACKWARD_EULER: pytest.approx(0.2), rules.LEAPFROG: 0.0}
+    assert ways == {rules.BACKWARD_EULER: pytest.approx(0.02), rules.LEAPFROG: 0.0}
+
+
+def test_a_foot_that_touches_down_between_two_glides_is_judged_by_the_longer_one(ironcub):
+    way, load = np.linspace(0.0, 0.01 * KNOTS, KNOTS + 1), np.zeros(KNOTS + 1)
+    load[4], way[6:] = 1.0, way[6:] + 0.1  # it stands over the intervals that begin and end at knot 4
+    worst = found(ironcub, moved(ironcub, way, load=load), task(torque=0.9))["gliding distance"]
+    assert worst.worst == pytest.approx(0.01 * (KNOTS - 5) + 0.1)
+    assert worst.knot == KNOTS
 
 
 # ------------------------------------------------------------ throttles
@@ -249,7 +257,7 @@ def test_the_turbines_are_slower_than_the_limit_of_their_throttles(ironcub, inde
 
 
 def test_margins_are_judged_where_they_are_asked_for(ironcub, tmp_path):
-    every = {"centre of pressure", "touch-down speed", "gliding speed", "throttle rate"}
+    every = {"centre of pressure", "touch-down speed", "gliding distance", "throttle rate"}
     assert every & set(judged(task(touch_down_speed=0.1), ironcub)) == every
     assert every & set(judged(task(torque=0.9), ironcub)) == every - {"touch-down speed"}
     assert every & set(judged(task(), ironcub)) == {"centre of pressure"}
@@ -276,7 +284,7 @@ OF_THE_IRONCUB = {
     "thrust off CVODES, interval": 5.0,
     "thrust off CVODES, horizon": 5.0,
     "touch-down speed": 0.04 * 2.378,
-    "gliding speed": 0.0713,
+    "gliding distance": 0.0231,
     "start: force balance": 1e-2,
     "end: moment balance": 1e-2,
 }
@@ -312,9 +320,7 @@ def test_a_small_robot_that_skates_does_not_pass_by_the_limits_of_a_large_one(ir
         assert [report[name].holds for name in ("slip under load", "force balance")] == [holds, holds]
 
 
-def test_speeds_of_a_foot_are_in_the_robots_own_unit(ironcub, tmp_path):
-    entry = PROPERTIES["gliding speed"]
+def test_ways_of_a_foot_are_in_the_robots_own_unit(ironcub, tmp_path):
+    entry = PROPERTIES["gliding distance"]
     for robot in (ironcub, solo(tmp_path)):
-        assert entry.limit_for(robot, None) == pytest.approx(
-            GLIDE_SPEED * (9.80665 * robot.standing_height) ** 0.5, rel=1e-3
-        )
+        assert entry.limit_for(robot, None) == pytest.approx(GLIDE_DISTANCE * robot.standing_height)

@@ -103,8 +103,6 @@ def step_forward():
         interval_min=0.05,
         interval_max=0.1,
         guess_steps=4,
-        complementarity_max=5e-4,
-        sliding_max=2e-4,
         weights=mt.Weights(com_acceleration=1.0, angular_momentum=1e2, joint_velocities={"legs": 0.1}, posture=1.0),
     )
 
@@ -118,7 +116,7 @@ def test_feet_of_a_small_robot_swing_low_in_the_start_guess(quadruped):
 
 
 def test_a_small_robot_without_jets_walks(quadruped):
-    """Every foot ends where it was led, and all of them stay within the robot's own reach."""
+    """Every foot ends where it was led, all stay within the robot's own reach, and loads stay on the ground."""
     assert not mt.doctor(quadruped, step_forward()).hopeless
     solution = mt.solve(mt.build(quadruped, step_forward()))
     assert solution.status.solved
@@ -126,3 +124,6 @@ def test_a_small_robot_without_jets_walks(quadruped):
     arms = motion.per_contact("contact_positions") - motion.com_position
     assert (np.abs(arms) <= quadruped.contact_reach[:, None] * (1 + 1e-6)).all()
     assert motion.com_position[0, -1] == pytest.approx(0.14, abs=1e-6)
+    report = mt.audit(quadruped, motion)
+    assert report["normal force × height"].holds
+    assert report["slip under load"].holds

@@ -205,7 +205,8 @@ def test_the_bounds_of_the_scenario_are_dashed_beside_the_products(robot, trajec
     scenario = scenarios.take_off()
     products = plotting.plot_margins(robot, replace(trajectory, scenario_json=to_json(scenario))).axes[0]
     dashed = {line.get_ydata()[0] for line in products.lines if line.get_color() == style.LIMIT["color"]}
-    assert dashed == {scenario.complementarity_max, np.sqrt(2.0) * scenario.sliding_max}
+    complementarity, sliding = scenario.contact_bounds(robot)
+    assert dashed == {complementarity, np.sqrt(2.0) * sliding}
 
 
 @pytest.mark.parametrize("name", ["joints", "torques"])

@@ -175,7 +175,7 @@ _ACTUATION_AND_CONTACT = (
         unit="N m",
         limit=4e-5,
         of=Of.MOMENT,
-        reason="for the iRonCub twice the default of `complementarity_max`",
+        reason="twice the default of `complementarity_max`",
         meaning="normal force of a contact point × its height, under leapfrog the greatest height of its knot and the "
         "two beside it, within which the force acts: force in the air",
     ),

@@ -79,7 +79,7 @@ def leap(task: Task) -> Iterator[Symptom]:
     gravity = robot.weight / robot.mass
     for label, height in heights.items():
         # A contact point keeps its share of the weight up to a height of complementarity_max over that share.
-        loose = scenario.complementarity_max * len(robot.contacts) / robot.weight
+        loose = scenario.contact_bounds(robot)[0] * len(robot.contacts) / robot.weight
         rise = (height or 0.0) - scenario.surface.height - robot.contact_reach[2] - loose
         if height is None or rise <= 0:
             continue

@@ -87,7 +87,7 @@ FRICTION_CONE = Constraint(
 )
 COMPLEMENTARITY = Constraint(
     value=constraints.complementarity,
-    within=at_most(lambda parameters: parameters.scenario.complementarity_max),
+    within=at_most(lambda parameters: parameters.complementarity_max),
     unit="N m",
     holds=Where.LATER_KNOTS,
     labels=_each("contact"),
@@ -168,9 +168,7 @@ THRUST_DYNAMICS = Constraint(
 )
 SLIDING = Constraint(
     value=constraints.sliding,
-    within=between(
-        lambda parameters: -parameters.scenario.sliding_max, lambda parameters: parameters.scenario.sliding_max
-    ),
+    within=between(lambda parameters: -parameters.sliding_max, lambda parameters: parameters.sliding_max),
     unit="N m",
     holds=Where.EVERY_INTERVAL,
     labels=_each("contact", "x", "y"),
@@ -188,7 +186,7 @@ STANDING_HEIGHT = Constraint(
 
 COMPLEMENTARITY_BEFORE = Constraint(
     value=constraints.complementarity_before,
-    within=at_most(lambda parameters: parameters.scenario.complementarity_max),
+    within=at_most(lambda parameters: parameters.complementarity_max),
     unit="N m",
     holds=Where.EVERY_INTERVAL,
     labels=_each("contact"),

@@ -17,12 +17,14 @@ class Parameters:
     scenario: Scenario
     surface: Surface
     friction: float  # Coulomb's coefficient [1]
+    complementarity_max: float  # ε_n [N m]
+    sliding_max: float  # ε_t [N m]
     standing: Posture  # near home, with the CoM where the motion starts
     target: Posture  # what posture costs pull to: that of the end where the motion ends standing, else the same
 
     @classmethod
     def of(cls, robot: Robot, scenario: Scenario, standing: Posture, target: Posture | None = None) -> Parameters:
-        """Return the parameters of a scenario; a friction that it leaves open is the robot's.
+        """Return the parameters of a scenario; what it leaves open is the robot's.
 
         Args:
             robot: with the jets that the scenario uses.
@@ -30,11 +32,14 @@ class Parameters:
             standing: posture near home, with the CoM where the motion starts.
             target: what posture costs pull to; by default the same.
         """
+        complementarity_max, sliding_max = scenario.contact_bounds(robot)
         return cls(
             robot=robot,
             scenario=scenario,
             surface=CachedSurface(scenario.surface),
             friction=scenario.friction or robot.friction,
+            complementarity_max=complementarity_max,
+            sliding_max=sliding_max,
             standing=standing,
             target=target or standing,
         )

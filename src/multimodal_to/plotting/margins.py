@@ -78,13 +78,12 @@ def _draw_products(axes: Axes, runs: Sequence[Run]) -> None:
                 linestyle=run.style,
                 label=label if number == 0 else None,
             )
-    bounds = [
-        bound
-        for scenario in map(stored, (run.trajectory for run in runs))
-        if scenario is not None
-        for bound in (scenario.complementarity_max, math.sqrt(2.0) * scenario.sliding_max)
-    ]
-    draw_limits(axes, set(bounds), "bounds")
+    bounds = set[float]()
+    for run in runs:
+        if (scenario := stored(run.trajectory)) is not None:
+            complementarity, sliding = scenario.contact_bounds(run.robot)
+            bounds |= {complementarity, math.sqrt(2.0) * sliding}
+    draw_limits(axes, bounds, "bounds")
     axes.set_yscale("log")
     axes.set_ylim(_PRODUCT_FLOOR, max(1e-3, 3.0 * axes.get_ylim()[1]))
     axes.set_ylabel("largest product [N m]")

@@ -178,7 +178,6 @@ def step_up() -> Scenario:
         title="Flying up onto a step",
         initial_com=(0.0, 0.0, 0.72),
         final_com=(-0.4, 0.0, 0.67),
-        sliding_max=2e-3,
         weights=replace(from_air.weights, joint_velocities=legs, foot_tilt=1e6, skimming=3e6),
         surface=Stairs(edges=(0.2,), heights=(0.0, 0.1), direction=(-1.0, 0.0), width=0.06),
     )
@@ -229,7 +228,7 @@ def paper(name: str) -> Scenario:
             interval_min=0.03,
             interval_max=0.05,
             mid_height_min=0.75,
-            sliding_max=2e-3,
+            sliding_max=None,
             weights=replace(plain.weights, angular_momentum=1e2, base_orientation=1e6, final_posture=1e7),
         )
     return plain

@@ -10,12 +10,17 @@ from types import MappingProxyType
 
 from multimodal_to.errors import ScenarioError, shown
 from multimodal_to.models.contact import FrictionCone
+from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Surface
 
 Vector3 = tuple[float, float, float]
 
 MOST_KNOTS = 10_000
 """More knots than this are a slip of the pen, and would fill any memory."""
+COMPLEMENTARITY = 2e-5
+"""ε_n where a scenario says none [m g L]: half of what the audit lets height × normal force be."""
+SLIDING = 8e-6
+"""ε_t where a scenario says none [m g L]: tighter, because slips add up while a foot stands."""
 _LONGEST_NAME = 100
 
 
@@ -174,10 +179,10 @@ class Scenario:
     """Coefficient of friction [1]; where there is none, the robot's own holds."""
     friction_cone: FrictionCone = FrictionCone.PYRAMID
     """Which forces a contact point can bear without slipping."""
-    complementarity_max: float = 5e-3
-    """ε_n, greatest height × normal force of a contact point [N m]."""
-    sliding_max: float = 2e-3
-    """ε_t, greatest slip over an interval × normal force of a contact point [N m]."""
+    complementarity_max: float | None = None
+    """ε_n, greatest height × normal force of a contact point [N m]; where there is none, 2e-5 m g L of the robot."""
+    sliding_max: float | None = None
+    """ε_t, greatest slip over an interval × normal force [N m]; where there is none, 8e-6 m g L of the robot."""
     base_speed_max: float = 2.0
     """Greatest size of each component of the base's twist [m/s, rad/s]."""
     com_range: Vector3 = (1.5, 1.5, 1.5)
@@ -193,6 +198,11 @@ class Scenario:
         self._check_numbers()
         self._check_positions()
         self._check_reach()
+
+    def contact_bounds(self, robot: Robot) -> tuple[float, float]:
+        """Return ε_n and ε_t [N m]; those that the scenario leaves open are `COMPLEMENTARITY` and `SLIDING` m g L."""
+        unit = robot.weight * robot.standing_height
+        return self.complementarity_max or COMPLEMENTARITY * unit, self.sliding_max or SLIDING * unit
 
     def _check_name(self) -> None:
         """Refuse a name that is no plain one, since results go to a folder of that name, and titles no screen takes."""
