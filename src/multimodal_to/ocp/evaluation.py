@@ -60,8 +60,8 @@ class Block:
         buffer, evaluate = self._mapped.buffer()  # CasADi reads and writes these arrays themselves
         for index, column in enumerate(columns):
             if column.size:
-                buffer.set_arg(index, memoryview(column.ravel()))
-        buffer.set_res(0, memoryview(values.ravel()))
+                buffer.set_arg(index, column.ravel().data)
+        buffer.set_res(0, values.ravel().data)
         evaluate()
         return values
 
