@@ -262,6 +262,7 @@ static int run_with(mt_horizon *horizon, unsigned char *needed, const double *co
   for (int64_t p = 0; p < horizon->part_count; p++) {
     if (!needed[p]) continue;
     const part *some = &horizon->parts[p];
+    if (!some->tape && !(brought && brought[p])) return 0;
     mine.blocks += blocks_of(horizon, some);
     work += blocks_of(horizon, some) * (some->tape ? some->tape->count : some->outputs);
   }
