@@ -186,6 +186,7 @@ def test_threads_change_no_bit_and_many_may_ask_at_once():
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.skipif("MULTIMODAL_TO_SANITIZED" in os.environ, reason="a sanitizer keeps memory that is freed")
 def test_memory_is_given_back():
     random = np.random.default_rng(12)
     function = random_function(random, size=5000, outputs=100)
