@@ -127,6 +127,12 @@ def test_functions_without_inputs_outputs_or_instructions_are_tapes_too():
     assert taped(nothing).registers == 0
 
 
+def test_a_function_that_holds_too_many_values_at_once_is_no_tape():
+    """An instruction names one of 65 535 registers; of x, 70 000 values wait for the sum that all of them divide."""
+    x = cs.SX.sym("x", 70_000)
+    assert tape_of(cs.Function("f", [x], [x / cs.sum1(x)])) is None
+
+
 def test_what_makes_no_sense_is_no_tape():
     known = operations()
     good = [[known["INPUT"], 0, 0, 0], [known["SIN"], 0, 0, 0], [known["OUTPUT"], 0, 0, 0]]
@@ -180,6 +186,7 @@ def test_threads_change_no_bit_and_many_may_ask_at_once():
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.skipif("MULTIMODAL_TO_SANITIZED" in os.environ, reason="a sanitizer keeps memory that is freed")
 def test_memory_is_given_back():
     random = np.random.default_rng(12)
     function = random_function(random, size=5000, outputs=100)

@@ -170,5 +170,5 @@ def _freed(owner: object, function: str, handle: int) -> None:
 
 def _kept(returned: int | None) -> int:
     if not returned:
-        raise MemoryError("there is not enough memory for the tapes")
+        raise MemoryError("there is not enough memory for the tapes, or values that have to be brought are not")
     return returned

@@ -60,8 +60,8 @@ class Block:
         buffer, evaluate = self._mapped.buffer()  # CasADi reads and writes these arrays themselves
         for index, column in enumerate(columns):
             if column.size:
-                buffer.set_arg(index, memoryview(column.ravel()))
-        buffer.set_res(0, memoryview(values.ravel()))
+                buffer.set_arg(index, column.ravel().data)
+        buffer.set_res(0, values.ravel().data)
         evaluate()
         return values
 
@@ -88,6 +88,9 @@ class Output:
     shape: tuple[int, int]
     entries: Sequence[Entries]
     dense: bool = False  # otherwise its nonzeros are where entries are
+    in_order: bool = (
+        False  # dense, each number from zero, value by value; otherwise its first value plus the others' sum
+    )
     total: bool = False  # what is returned is the sum over a vector, one number
 
 
@@ -127,13 +130,17 @@ class _Sum:
             pattern = cs.Sparsity(height, width, starts.tolist(), (places % height).tolist())
             return cls(pattern=pattern, first=first, targets=targets, terms=terms)
         firsts = np.full(height * width, -1)
+        if output.in_order:
+            return cls(pattern=cs.Sparsity.dense(height, width), first=firsts, targets=key[order], terms=value[order])
         firsts[places] = first
         return cls(pattern=cs.Sparsity.dense(height, width), first=firsts, targets=places[targets], terms=terms)
 
     def add_up(self, values: Array, out: Array) -> None:
         """Write the sums of values, behind which there is a zero, in the order in which a tape's are added."""
         out[:] = values[self.first]
-        np.add.at(out, self.targets, values[self.terms])
+        sums = np.zeros(out.size)
+        np.add.at(sums, self.targets, values[self.terms])
+        out[self.targets] = out[self.targets] + sums[self.targets]
 
 
 def _flat(arrays: Sequence[Integers]) -> Integers:

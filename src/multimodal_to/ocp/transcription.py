@@ -198,7 +198,7 @@ def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
     of_x, of_x_and_p = {"x": count}, {"x": count, "p": 0}
     of_all = {"x": count, "p": 0, "lam_f": 1, "lam_g": first_row}
     every_row = Output(name="g", shape=(first_row, 1), entries=rows, dense=True)
-    every_cost = Output(name="costs", shape=(first_cost, 1), entries=costs, dense=True)
+    every_cost = Output(name="costs", shape=(first_cost, 1), entries=costs, dense=True, in_order=True)
     objective = replace(every_cost, name="f", total=True)
     gradient = Output(name="grad_f_x", shape=(count, 1), entries=gradients, dense=True)
     jacobian = Output(name="jac_g_x", shape=(first_row, count), entries=jacobians)

@@ -4,7 +4,7 @@
  *    Cocke and Schwartz 1970). Values that nothing uses are left out.
  * 2. A product that only one sum or difference uses becomes one instruction with it. Both are still rounded.
  * 3. Within a window, values come in an order with long runs of one operation: the processor then foresees each jump.
- *    This makes a run three to five times as fast.
+ *    This makes a run three to four times as fast.
  * 4. A value takes the register that was left last, from its instruction to its last use.
  *
  * No value changes by a bit; only which of two NaN, and so the sign of a NaN, comes out of an operation is not said. */

@@ -1,8 +1,8 @@
 /* All tapes of a horizon, shared by threads, and their values put where they belong.
  *
  * A block is a run of one tape for `width` intervals; its values lie as (outputs, width). Threads take blocks as they
- * come. Then each computes a share of the numbers of the results: the first value of each, and what is added to it in
- * the order that it was given. So a result does not depend on the number of threads. */
+ * come. Then each computes a share of the numbers of the results: the first value of each, plus the sum of the others in
+ * the order that they were given. So a result does not depend on the number of threads. */
 #include "tape_horizon.h"
 
 #include <stdatomic.h>
@@ -226,8 +226,11 @@ static void put_share(void *context, int thread) {
     const result *some = &mine->horizon->results[r];
     const int64_t from = some->size * thread / mine->threads, to = some->size * (thread + 1) / mine->threads;
     for (int64_t k = from; k < to; k++) out[k] = some->first[k] < 0 ? 0.0 : values[some->first[k]];
-    for (int64_t k = first_from(some, from), end = first_from(some, to); k < end; k++) {
-      out[some->targets[k]] += values[some->terms[k]];
+    for (int64_t k = first_from(some, from), end = first_from(some, to); k < end;) {
+      const int32_t target = some->targets[k];
+      double sum = 0.0;
+      for (; k < end && some->targets[k] == target; k++) sum += values[some->terms[k]];
+      out[target] += sum;
     }
   }
 }
@@ -259,6 +262,7 @@ static int run_with(mt_horizon *horizon, unsigned char *needed, const double *co
   for (int64_t p = 0; p < horizon->part_count; p++) {
     if (!needed[p]) continue;
     const part *some = &horizon->parts[p];
+    if (!some->tape && !(brought && brought[p])) return 0;
     mine.blocks += blocks_of(horizon, some);
     work += blocks_of(horizon, some) * (some->tape ? some->tape->count : some->outputs);
   }

@@ -34,7 +34,7 @@ MT_EXPORT int mt_horizon_add(mt_horizon *horizon, const mt_tape *tape, int64_t r
 MT_EXPORT int mt_horizon_result(mt_horizon *horizon, int64_t result, int64_t size, const int64_t *first, int64_t more,
                                 const int64_t *targets, const int64_t *terms);
 
-/* Compute results; return 0 where there is no memory. Any number of threads may call at once.
+/* Compute results; return 0 where there is no memory, or values are not brought. Any number of threads may call at once.
  *
  * sources: the arrays.
  * results: where each is put; what is NULL is not computed, nor what it alone needs.

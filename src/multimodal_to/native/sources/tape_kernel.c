@@ -55,7 +55,7 @@ int MT_KERNEL(mt_tape_width)(void) {
     at++;                               \
     goto *places[at->operation];        \
   }
-#define PARTS _Pragma("GCC unroll 8") for (int part = 0; part < REGISTERS; part++)
+#define PARTS for (int part = 0; part < REGISTERS; part++)
 #define REGISTER(index) (*(wide *)((char *)registers + (size_t)(uint32_t)(index) * sizeof(wide)))
 #define x (REGISTER(at->first).part[part])
 #define y (REGISTER(at->second).part[part])
