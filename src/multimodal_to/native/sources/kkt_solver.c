@@ -174,9 +174,14 @@ int kkt_take_values(Kkt *kkt, const double *values, int *negative) {
   const KktPattern *p = &kkt->pattern;
   double started = now();
   memset(kkt->matrix.value, 0, sizeof(double) * (size_t)p->entries);
-  for (int t = 0; t < p->triplets; t++) kkt->matrix.value[p->place[t]] += values[t];
+  double nothing = 0; /* 0 · v is 0 of finite numbers only */
+  for (int t = 0; t < p->triplets; t++) {
+    kkt->matrix.value[p->place[t]] += values[t];
+    nothing += 0 * values[t];
+  }
   kkt->matrix.threshold = PIVOT_LEAST;
-  int status = factorise(kkt, 0, 1);
+  kkt->current = NULL;
+  int status = nothing == 0 ? factorise(kkt, 0, 1) : KKT_NO_NUMBER;
   kkt->counts.factorisations++;
   kkt->counts.seconds_factorising += now() - started;
   if (status) {
