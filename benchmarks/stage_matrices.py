@@ -44,7 +44,9 @@ class StageMatrix:
         return self.structure.inequalities + self.structure.equalities
 
 
-def _knot_rows(rng: np.random.Generator, sizes: list[int], first: Any, shared: int, count: int, density: float) -> Floats:
+def _knot_rows(
+    rng: np.random.Generator, sizes: list[int], first: Any, shared: int, count: int, density: float
+) -> Floats:
     """Return rows over the variables of one interval each, and now and then over others."""
     total = sum(sizes) + shared
     rows = np.zeros((count, total))
@@ -191,7 +193,13 @@ class Ma27:
         """Return INFO(1) and the solution."""
         x = np.array(right_side)
         self._library.ma27cd_(
-            ctypes.byref(self._size), *[None] * 6, *self._refs(x), None, ctypes.byref(self._one), self._icntl, self._info
+            ctypes.byref(self._size),
+            *[None] * 6,
+            *self._refs(x),
+            None,
+            ctypes.byref(self._one),
+            self._icntl,
+            self._info,
         )
         return self._info[0], x
 

@@ -56,20 +56,27 @@ def test_the_papers_problem_has_the_same_answer(problem):
 
 
 def test_leapfrog_within_margins_has_the_same_answer(ironcub, squat):
-    both(mt.build(ironcub, squat))
+    both(mt.build(ironcub, replace(squat, knots=5)))
 
 
 def test_a_take_off_with_jets_has_the_same_answer(ironcub):
-    scenario = replace(mt.scenarios.paper("take-off"), knots=15, interval_min=0.15, interval_max=0.3)
+    scenario = replace(mt.scenarios.paper("take-off"), knots=20, interval_min=0.15, interval_max=0.2)
     both(mt.build(ironcub, scenario, mt.Formulation.paper()))
 
 
-def test_a_drone_without_contacts_that_move_has_the_same_answer(tmp_path):
-    robot = drone(tmp_path)
-    scenario = replace(
-        mt.scenarios.paper("take-off"), knots=12, interval_min=0.1, interval_max=0.3, final_com=(0.0, 0.0, 0.8)
+def test_a_body_without_joints_has_the_same_answer(tmp_path):
+    scenario = mt.Scenario(
+        name="hop",
+        title="hop",
+        knots=30,
+        initial_com=(0.0, 0.0, 0.4),
+        final_com=(0.0, 0.0, 0.6),
+        terminal=mt.Terminal.HOVER,
+        interval_min=0.1,
+        interval_max=0.2,
+        weights=mt.Weights(com_velocity=1e3, com_acceleration=1e2, contact_forces=1e-2),
     )
-    both(mt.build(robot, scenario, mt.Formulation.paper()))
+    both(mt.build(drone(tmp_path), scenario, mt.Formulation.paper()))
 
 
 def test_terms_of_ones_own_are_part_of_the_structure(ironcub, squat):
@@ -77,7 +84,7 @@ def test_terms_of_ones_own_are_part_of_the_structure(ironcub, squat):
         """Σ ṡ² of all joints."""
         return knot.joint_velocities.T @ knot.joint_velocities
 
-    slow = Constraint(value=all_at_once, within=at_most(0.05), unit="rad²/s²", holds=Where.LATER_KNOTS)
+    slow = Constraint(value=all_at_once, within=at_most(0.2), unit="rad²/s²", holds=Where.LATER_KNOTS)
     formulation = mt.Formulation.paper().with_terms(slow)
     both(mt.build(ironcub, replace(squat, margins=mt.Margins()), formulation))
 

@@ -129,26 +129,27 @@ int kkt_take_structure(Kkt *kkt, int size, int triplets, const int *irn, const i
   return refusal ? refuse(kkt, refusal) : 1;
 }
 
-/* Return the plan with or without definitions, made where it is needed first; NULL where there is none. */
-static KktPlan *plan_of(Kkt *kkt, int without) {
-  KktPlan *const plan = &kkt->plan[without];
+static int make_plan(Kkt *kkt, KktPlan *plan, int without) {
   jmp_buf failure;
-  double started = now();
-  if (plan->factors) return plan;
-  if (setjmp(failure)) {
-    kkt_free_plan(plan);
-    refuse(kkt, "there is not enough memory for the structured factorisation");
-    return NULL;
-  }
+  if (setjmp(failure)) return refuse(kkt, "there is not enough memory for the structured factorisation");
   plan->arena.failure = &failure;
   kkt_make_plan(plan, &kkt->pattern, kkt->matrix.value, !without);
-  if (plan->largest > LARGEST_FRONT || plan->operations > OPERATIONS_MOST) {
-    kkt_free_plan(plan);
-    refuse(kkt, "knots are coupled by too many unknowns for the structured factorisation");
-    return NULL;
-  }
+  if (plan->largest > LARGEST_FRONT || plan->operations > OPERATIONS_MOST)
+    return refuse(kkt, "knots are coupled by too many unknowns for the structured factorisation");
   kkt_take_work(plan);
   plan->arena.failure = NULL;
+  return 1;
+}
+
+/* Return the plan with or without definitions, made where it is needed first; NULL where there is none. */
+static KktPlan *plan_of(Kkt *kkt, int without) {
+  KktPlan *plan = &kkt->plan[without];
+  double started = now();
+  if (plan->factors) return plan;
+  if (!make_plan(kkt, plan, without)) {
+    kkt_free_plan(plan);
+    return NULL;
+  }
   kkt->counts.seconds_planning += now() - started;
   return plan;
 }
