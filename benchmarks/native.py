@@ -107,6 +107,7 @@ def sanitized(name: str, runtimes: Sequence[str], options: dict[str, str], tests
             "pytest",
             "-p",
             "no:cacheprovider",
+            "--capture=sys",  # what a sanitizer writes is seen
             "--durations=0",
             "--durations-min=5",
         ]

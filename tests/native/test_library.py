@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from multimodal_to.native import compiling, instruction_set, library, missing
+from multimodal_to.native import compiling, instruction_set, library, library_file, missing
 from multimodal_to.native.library import (
     BESIDE,
     INSTRUCTION_SETS,
@@ -29,6 +29,15 @@ def test_the_library_of_this_installation_opens(compiler):
 
 def test_it_is_opened_once():
     assert library() is library()
+
+
+def test_who_opens_its_file_by_path_shares_its_memory(compiler):
+    """As IPOPT does, which loads its linear solver by a path."""
+    again = ctypes.CDLL(str(library_file()))
+    before = library().mt_threads()
+    again.mt_set_threads(before + 1)
+    assert library().mt_threads() == before + 1
+    library().mt_set_threads(before)
 
 
 def test_loops_take_the_threads_that_this_process_may_use(compiler):

@@ -32,6 +32,11 @@ def library() -> ctypes.CDLL | None:
     return _opened()[0]
 
 
+def library_file() -> Path | None:
+    """Return the file of the opened library, for what opens it by its path; None where there is no library."""
+    return None if (opened := library()) is None else Path(opened._name)
+
+
 def missing() -> str:
     """Return in one sentence why there is no library; nothing where there is one."""
     return _opened()[1]
