@@ -2,8 +2,8 @@
 
     python benchmarks/stage_matrices.py [--count 10000] [--seed 0]
 
-Factorises that many matrices with the native library and judges each by its dense eigenvalues. Sizes, ranks and inertias
-are drawn. Prints one line, and every matrix that was judged wrong; exit status 0 when there is none.
+Factorises that many matrices with the native library and judges each by its dense eigenvalues. Sizes, ranks and
+inertias are drawn. Prints one line, and every matrix that was judged wrong; exit status 0 when there is none.
 """
 
 from __future__ import annotations

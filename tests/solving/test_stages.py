@@ -59,11 +59,6 @@ def test_leapfrog_within_margins_has_the_same_answer(ironcub, squat):
     both(mt.build(ironcub, replace(squat, knots=5)))
 
 
-def test_a_take_off_with_jets_has_the_same_answer(ironcub):
-    scenario = replace(mt.scenarios.paper("take-off"), knots=20, interval_min=0.15, interval_max=0.2)
-    both(mt.build(ironcub, scenario, mt.Formulation.paper()))
-
-
 def test_a_body_without_joints_has_the_same_answer(tmp_path):
     scenario = mt.Scenario(
         name="hop",
