@@ -126,7 +126,9 @@ int kkt_take_structure(Kkt *kkt, int size, int triplets, const int *irn, const i
   kkt->arena.failure = &failure;
   const char *refusal = read_structure(kkt, triplets, irn, jcn);
   kkt->arena.failure = NULL;
-  return refusal ? refuse(kkt, refusal) : 1;
+  if (!refusal) return 1;
+  forget_structure(kkt);
+  return refuse(kkt, refusal);
 }
 
 static int make_plan(Kkt *kkt, KktPlan *plan, int without) {
@@ -174,6 +176,7 @@ static int factorise(Kkt *kkt, int without, int break_off) {
 int kkt_take_values(Kkt *kkt, const double *values, int *negative) {
   const KktPattern *p = &kkt->pattern;
   double started = now();
+  if (!kkt->irn) return KKT_SINGULAR; /* no structure was taken */
   memset(kkt->matrix.value, 0, sizeof(double) * (size_t)p->entries);
   double nothing = 0; /* 0 · v is 0 of finite numbers only */
   for (int t = 0; t < p->triplets; t++) {
