@@ -65,10 +65,10 @@ class StageSolver:
     def __init__(self, library: ctypes.CDLL, structure: KktStructure) -> None:
         self._library, self._pointer, self._number = _declared(library), None, 0
         knots = np.ascontiguousarray(structure.variable_knots, dtype=np.int32)
-        self._pointer = library.mt_kkt_new(
+        self._pointer = self._library.mt_kkt_new(
             knots.size, structure.inequalities, structure.equalities, structure.knots, knots.ctypes.data_as(_KNOT)
         )
-        self._number = library.mt_kkt_open(self._pointer) if self._pointer else 0
+        self._number = self._library.mt_kkt_open(self._pointer) if self._pointer else 0
         if not self._number:
             self.close()
             raise SolverError("there is not enough memory for the structured linear solver")

@@ -27,10 +27,12 @@
 typedef struct {
   void **blocks;
   int count, capacity;
+  char *chunk; /* that small pieces are cut from */
+  size_t left;
   jmp_buf *failure;
 } KktArena;
 
-void *kkt_take(KktArena *arena, size_t count, size_t size); /* zeros, aligned for vectors */
+void *kkt_take(KktArena *arena, size_t count, size_t size); /* zeros; from 512 bytes on aligned for vectors */
 void kkt_give_back(KktArena *arena);
 
 /* Numbers whose count changes, aligned for vectors; growing does not keep them. */
@@ -146,6 +148,7 @@ typedef struct {
   int panel_most, panel_rows_most, group_values_most, z_values_most, products_most;
   int row_most;      /* columns of an inequality row */
   double operations; /* of a factorisation, about */
+  char *row_meets;   /* of each inequality row: whether there is a defined variable in it */
   KktRows meets;     /* of each definition: unknowns that its variable has entries with, but for its own row */
   KktFactors *factors;
   KktWork work[3];   /* of the chain from the start, of that from the end, and of the root */

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+enum { START = 1, END = 2, ROOT = 4 };
 enum { PAIR_COLUMNS_MOST = 8 }; /* columns of a row that is eliminated as a pair */
 #define PAIRS 0.1               /* least |a| of a pair's variable, as a share of the largest in its row */
 
@@ -15,6 +16,7 @@ typedef struct {
   int *visited, visit;
   int *mark, stamp;
   char *is_pair;
+  char *halves;      /* of the tree that refer to an unknown: the root is in both */
   KktList *columns;  /* of each equality row: the variables in the fronts that it has entries with */
 } Elimination;
 
@@ -34,6 +36,8 @@ static void see(Elimination *x, int k, int unknown) {
   if (definition < 0) {
     kkt_push(planning->arena, &planning->seen_at[k], unknown);
     x->fronts_left[unknown]++;
+    x->halves[unknown] |= (k <= planning->plan->root ? START : 0) | (k >= planning->plan->root ? END : 0);
+    if (k == planning->plan->root) x->halves[unknown] |= ROOT;
     return;
   }
   kkt_push(planning->arena, &planning->defined_at[k], definition);
@@ -58,6 +62,11 @@ static void see_all(Elimination *x) {
       if (r < p->equalities) see(x, k, kkt_equality(p, r));
     }
   }
+  for (int i = 0; i < p->size; i++) /* what both halves refer to is eliminated in the root */
+    if (x->halves[i] == (START | END)) {
+      kkt_push(x->planning->arena, &x->planning->seen_at[x->planning->plan->root], i);
+      x->fronts_left[i]++;
+    }
 }
 
 static void find_columns(Elimination *x) {
@@ -189,6 +198,7 @@ void kkt_choose_eliminations(KktPlanning *planning) {
   x.visited = kkt_take(arena, n, sizeof(int));
   x.mark = kkt_take(arena, n, sizeof(int));
   x.is_pair = kkt_take(arena, n, 1);
+  x.halves = kkt_take(arena, n, 1);
   x.done = kkt_take(arena, n, sizeof(int));
   x.mate = kkt_take(arena, n, sizeof(int));
   for (size_t i = 0; i < n; i++) x.done[i] = x.mate[i] = -1;

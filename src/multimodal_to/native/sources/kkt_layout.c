@@ -82,7 +82,19 @@ typedef struct {
   int *group_of, *member_of; /* of each defined variable of the front */
   KktList *touched;          /* positions, of each group, with repeats until sorted */
   KktList products;          /* pairs of defined variables */
+  char *seen;                /* of each position of the front, zeros between uses */
 } Layout;
+
+/* Return the positions of a list once each, rising. */
+static KktList sorted(const Layout *x, const KktList *positions) {
+  KktList once = {0};
+  for (int i = 0; i < positions->count; i++) x->seen[positions->items[i]] = 1;
+  for (int i = 0; i < x->front->size; i++) {
+    if (x->seen[i]) kkt_push(x->planning->arena, &once, i);
+    x->seen[i] = 0;
+  }
+  return once;
+}
 
 static const int *row_columns(const KktPlanning *planning, int definition, int *count) {
   const KktPattern *p = planning->pattern;
@@ -255,7 +267,7 @@ static void place_rows(Layout *x, int k) {
   KktArena *arena = x->planning->arena, *own = &x->planning->plan->arena;
   KktFront *front = x->front;
   KktList places = {0}, slots = {0}, row = {0}, start = {0}, plain = {0}, inside = {0}, slot = {0}, target = {0};
-  KktList columns = {0}, panel = {0};
+  KktList columns = {0}, panel;
   kkt_push(arena, &start, 0);
   for (int t = 0; t < rows->count; t++) {
     if (rows->items[t] < p->equalities) continue;
@@ -274,10 +286,7 @@ static void place_rows(Layout *x, int k) {
     front->panel_rows += in_panel;
     if (places.count > x->planning->plan->row_most) x->planning->plan->row_most = places.count;
   }
-  int *sorted = kept(arena, &columns);
-  if (columns.count) qsort(sorted, (size_t)columns.count, sizeof(int), compare);
-  for (int i = 0; i < columns.count; i++)
-    if (!i || sorted[i] != sorted[i - 1]) kkt_push(arena, &panel, sorted[i]);
+  panel = sorted(x, &columns);
   front->panel = panel.count;
   front->panel_position = kept(own, &panel);
   front->panel_place = kkt_take(own, (size_t)columns.count + 1, sizeof(int));
@@ -313,10 +322,7 @@ static void sort_touched(Layout *x) {
     for (int z = 0; z < group->depends; z++) kkt_push(arena, &x->touched[x->group_of[to]], group->depend[z]);
   }
   for (int g = 0; g < front->groups; g++) {
-    KktList *touched = &x->touched[g], unique = {0};
-    if (touched->count) qsort(touched->items, (size_t)touched->count, sizeof(int), compare);
-    for (int i = 0; i < touched->count; i++)
-      if (!i || touched->items[i] != touched->items[i - 1]) kkt_push(arena, &unique, touched->items[i]);
+    KktList unique = sorted(x, &x->touched[g]);
     front->group[g].touched = unique.count;
     front->group[g].position = kept(&x->planning->plan->arena, &unique);
     front->group[g].first = front->group_values;
@@ -425,15 +431,16 @@ static void note_largest(KktPlan *plan, const KktFront *front) {
 
 void kkt_lay_out(KktPlanning *planning) {
   KktPlan *plan = planning->plan;
-  int *place = kkt_take(planning->arena, (size_t)planning->pattern->size, sizeof(int));
+  int *place = kkt_take(planning->arena, (size_t)planning->pattern->size + 1, sizeof(int));
   for (int o = plan->fronts - 1; o >= 0; o--) {
     int k = planning->order[o];
     if (plan->front[k].parent >= 0) place_border(planning, k, place);
     place_unknowns(planning, k);
   }
   measure(plan);
+  char *seen = kkt_take(planning->arena, (size_t)plan->largest + 1, 1);
   for (int k = 0; k < plan->fronts; k++) {
-    Layout x = {.planning = planning, .front = &plan->front[k], .place = place};
+    Layout x = {.planning = planning, .front = &plan->front[k], .place = place, .seen = seen};
     for (int i = 0; i < x.front->size; i++) place[x.front->unknown[i]] = i;
     make_groups(&x, k);
     fill_groups(&x);

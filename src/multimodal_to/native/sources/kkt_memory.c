@@ -6,6 +6,7 @@
 #include <string.h>
 
 enum { ALIGNMENT = 64 }; /* of a cache line, and of the longest vector */
+enum { SMALL = 512, SMALL_ALIGNMENT = 16, CHUNK = 1 << 16 }; /* small pieces are cut from chunks [bytes] */
 
 static void *own(KktArena *arena, void *block) {
   if (block && arena->count == arena->capacity) {
@@ -24,10 +25,21 @@ static void *own(KktArena *arena, void *block) {
   return block;
 }
 
+static char *aligned(void *block) { return (char *)block + (ALIGNMENT - (uintptr_t)block % ALIGNMENT); }
+
 void *kkt_take(KktArena *arena, size_t count, size_t size) {
   if (size && count > (SIZE_MAX - 2 * ALIGNMENT) / size) longjmp(*arena->failure, KKT_NO_MEMORY);
-  char *block = own(arena, calloc(1, count * size + 2 * ALIGNMENT));
-  return block + (ALIGNMENT - (uintptr_t)block % ALIGNMENT);
+  size_t bytes = count * size;
+  if (bytes >= SMALL) return aligned(own(arena, calloc(1, bytes + ALIGNMENT)));
+  bytes = (bytes + SMALL_ALIGNMENT) / SMALL_ALIGNMENT * SMALL_ALIGNMENT;
+  if (bytes > arena->left) {
+    arena->chunk = aligned(own(arena, calloc(1, CHUNK + ALIGNMENT)));
+    arena->left = CHUNK;
+  }
+  char *piece = arena->chunk;
+  arena->chunk += bytes;
+  arena->left -= bytes;
+  return piece;
 }
 
 void kkt_give_back(KktArena *arena) {

@@ -215,6 +215,10 @@ static void find_meetings(KktPlan *plan, const KktPattern *p, KktArena *scratch)
       kkt_push(scratch, &other[i], kkt_equality(p, r));
       kkt_push(scratch, &entry[i], p->rows.entry[q]);
     }
+  plan->row_meets = kkt_take(&plan->arena, (size_t)p->slacks + 1, 1);
+  for (int i = 0; i < p->slacks; i++)
+    for (int q = p->rows.start[p->equalities + i]; q < p->rows.start[p->equalities + i + 1]; q++)
+      if (d->of_variable[p->rows.column[q]] >= 0) plan->row_meets[i] = 1;
   for (int i = 0; i < d->count; i++) start[i] = total, total += other[i].count;
   start[d->count] = total;
   plan->meets = (KktRows){start, filled(&plan->arena, total, 0), filled(&plan->arena, total, 0)};

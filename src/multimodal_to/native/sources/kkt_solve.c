@@ -164,7 +164,7 @@ static void reduce(const KktMatrix *matrix, const KktPlan *plan, const double *r
   for (int i = 0; i < d->count; i++) start[d->variable[i]] = rhs[kkt_equality(p, d->row[i])] / matrix->value[d->entry[i]];
   for (int i = 0; i < p->slacks; i++) {
     double left = rhs[kkt_inequality(p, i)];
-    if (d->count) left -= row_times(matrix, p->equalities + i, start);
+    if (plan->row_meets[i]) left -= row_times(matrix, p->equalities + i, start);
     subtract_row(matrix, p->equalities + i, multiplier(matrix, i, rhs[kkt_slack(p, i)], left), r);
   }
   for (int i = 0; i < d->count; i++)
@@ -192,7 +192,7 @@ static void complete(const KktMatrix *matrix, const KktPlan *plan, const double 
     double rest = rhs[y] - row_times(matrix, p->equalities + i, x);
     x[y] = multiplier(matrix, i, rhs[s], rest);
     x[s] = (delta * rhs[s] - e * rest) / matrix->determinant[i];
-    if (d->count) subtract_row(matrix, p->equalities + i, x[y], left);
+    if (plan->row_meets[i]) subtract_row(matrix, p->equalities + i, x[y], left);
   }
   for (int i = 0; i < d->count; i++) {
     double rest = rhs[d->variable[i]] + left[d->variable[i]];

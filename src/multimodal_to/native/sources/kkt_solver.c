@@ -126,29 +126,32 @@ int kkt_take_structure(Kkt *kkt, int size, int triplets, const int *irn, const i
   kkt->arena.failure = &failure;
   const char *refusal = read_structure(kkt, triplets, irn, jcn);
   kkt->arena.failure = NULL;
-  return refusal ? refuse(kkt, refusal) : 1;
+  if (!refusal) return 1;
+  forget_structure(kkt);
+  return refuse(kkt, refusal);
+}
+
+static int make_plan(Kkt *kkt, KktPlan *plan, int without) {
+  jmp_buf failure;
+  if (setjmp(failure)) return refuse(kkt, "there is not enough memory for the structured factorisation");
+  plan->arena.failure = &failure;
+  kkt_make_plan(plan, &kkt->pattern, kkt->matrix.value, !without);
+  if (plan->largest > LARGEST_FRONT || plan->operations > OPERATIONS_MOST)
+    return refuse(kkt, "knots are coupled by too many unknowns for the structured factorisation");
+  kkt_take_work(plan);
+  plan->arena.failure = NULL;
+  return 1;
 }
 
 /* Return the plan with or without definitions, made where it is needed first; NULL where there is none. */
 static KktPlan *plan_of(Kkt *kkt, int without) {
-  KktPlan *const plan = &kkt->plan[without];
-  jmp_buf failure;
+  KktPlan *plan = &kkt->plan[without];
   double started = now();
   if (plan->factors) return plan;
-  if (setjmp(failure)) {
+  if (!make_plan(kkt, plan, without)) {
     kkt_free_plan(plan);
-    refuse(kkt, "there is not enough memory for the structured factorisation");
     return NULL;
   }
-  plan->arena.failure = &failure;
-  kkt_make_plan(plan, &kkt->pattern, kkt->matrix.value, !without);
-  if (plan->largest > LARGEST_FRONT || plan->operations > OPERATIONS_MOST) {
-    kkt_free_plan(plan);
-    refuse(kkt, "knots are coupled by too many unknowns for the structured factorisation");
-    return NULL;
-  }
-  kkt_take_work(plan);
-  plan->arena.failure = NULL;
   kkt->counts.seconds_planning += now() - started;
   return plan;
 }
@@ -173,10 +176,16 @@ static int factorise(Kkt *kkt, int without, int break_off) {
 int kkt_take_values(Kkt *kkt, const double *values, int *negative) {
   const KktPattern *p = &kkt->pattern;
   double started = now();
+  if (!kkt->irn) return KKT_SINGULAR; /* no structure was taken */
   memset(kkt->matrix.value, 0, sizeof(double) * (size_t)p->entries);
-  for (int t = 0; t < p->triplets; t++) kkt->matrix.value[p->place[t]] += values[t];
+  double nothing = 0; /* 0 · v is 0 of finite numbers only */
+  for (int t = 0; t < p->triplets; t++) {
+    kkt->matrix.value[p->place[t]] += values[t];
+    nothing += 0 * values[t];
+  }
   kkt->matrix.threshold = PIVOT_LEAST;
-  int status = factorise(kkt, 0, 1);
+  kkt->current = NULL;
+  int status = nothing == 0 ? factorise(kkt, 0, 1) : KKT_NO_NUMBER;
   kkt->counts.factorisations++;
   kkt->counts.seconds_factorising += now() - started;
   if (status) {
