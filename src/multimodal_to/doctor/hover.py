@@ -21,7 +21,6 @@ from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import Constraint, equal
 from multimodal_to.scenarios.scenario import Vector3
 
-_UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 _SLACK = 2e-2
 """Share of the weight that a base within its tolerance of upright, and what force contacts may keep, cannot make up."""
 _HOVER = (
@@ -64,8 +63,8 @@ def trim(task: Task) -> Iterator[Symptom]:
 
 
 def upright(task: Task) -> Posture:
-    """Return the posture with the base upright, where a hover has to be within 2e-3 rad of it."""
-    return replace(task.posture, base_quaternion_xyzw=_UPRIGHT)
+    """Return the posture with the base upright, where a hover has to be within 2e-3 rad of it: `Robot.upright`."""
+    return replace(task.posture, base_quaternion_xyzw=task.robot.upright.base_quaternion_xyzw)
 
 
 def _impossible(task: Task, posture: Posture, here: Residual) -> str:

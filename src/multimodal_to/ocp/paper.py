@@ -32,6 +32,9 @@ from multimodal_to.trajectory.quantities import TWIST, XYZ, XYZW, row_labels
 ON_GROUND = 1e-5
 """Largest height of a contact point that stands [m]: a sole has more corners than a plane needs."""
 
+UPRIGHT = 1e-3
+"""How far each part of the base's quaternion, from upright, may be off in a hover [1]: 2e-3 rad about each axis."""
+
 FORCE = 50.0
 """Size of a force that the solver takes for one [N]."""
 
@@ -58,6 +61,16 @@ def _stands_last(parameters: Parameters) -> bool:
 UNIT_QUATERNION = Constraint(
     value=constraints.unit_quaternion, within=equal(), unit="1", holds=Where.FIRST_KNOT, when=_hovers_first
 )
+UPRIGHT_FIRST = Constraint(
+    name="upright_first",
+    value=constraints.off_upright,
+    within=between(-UPRIGHT, UPRIGHT),
+    unit="1",
+    holds=Where.FIRST_KNOT,
+    labels=("level 1", "level 2", "vertical", "w"),
+    when=_hovers_first,
+)
+UPRIGHT_LAST = replace(UPRIGHT_FIRST, name="upright_last", holds=Where.LAST_KNOT, when=_hovers_last)
 COM_KINEMATICS = Constraint(value=constraints.com_kinematics, within=equal(), unit="m", labels=XYZ)
 ANGULAR_MOMENTUM_KINEMATICS = Constraint(
     value=constraints.angular_momentum_kinematics,
@@ -222,6 +235,8 @@ LEAPFROG = (COMPLEMENTARITY_BEFORE, COMPLEMENTARITY_AFTER, SLIDING_AFTER, FINAL_
 
 CONSTRAINTS = (
     UNIT_QUATERNION,
+    UPRIGHT_FIRST,
+    UPRIGHT_LAST,
     COM_KINEMATICS,
     ANGULAR_MOMENTUM_KINEMATICS,
     CONTACT_KINEMATICS,

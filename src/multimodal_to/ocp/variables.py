@@ -129,6 +129,8 @@ class Bounds:
 def ranges(robot: Robot, scenario: Scenario, layout: Layout) -> Bounds:
     """Return the box constraints that hold at every knot: limits of the robot, and of the scenario (eq. 28, 29).
 
+    A quaternion has no box: its norm is what its integration keeps, and at ±1 some headings would start on a bound.
+
     Args:
         robot: whose limits hold.
         scenario: whose limits hold.
@@ -139,7 +141,6 @@ def ranges(robot: Robot, scenario: Scenario, layout: Layout) -> Bounds:
     reach = np.array(scenario.com_range)
     box: dict[str, tuple[Any, Any]] = {
         "com_position": (-reach, reach),
-        "base_quaternion_xyzw": (-1.0, 1.0),
         "base_linear_velocity": (-speed, speed),
         "base_angular_velocity": (-speed, speed),
         "joint_positions": (limits.lower, limits.upper),
