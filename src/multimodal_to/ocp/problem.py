@@ -87,9 +87,7 @@ class Problem:
         motion = regrid(trajectory, knots, self.formulation.rule.name)
         values = np.vstack([getattr(motion, name) for name in self.layout.rows])
         rho = self.layout.rows["base_quaternion_xyzw"]
-        if (
-            values[rho, 0] @ (self.guess * self.scale)[rho] < 0.0
-        ):  # −ρ is the same attitude; the problem has one
+        if values[rho, 0] @ (self.guess * self.scale)[rho] < 0.0:  # −ρ is the same attitude; the problem has one
             values[rho] *= -1.0
         x = np.append(values.ravel(order="F"), trajectory.duration / knots) / self.scale
         return np.clip(x, self.lower, self.upper)
