@@ -10,7 +10,7 @@ import numpy as np
 
 from multimodal_to.adam.lean_tree import build_tree
 from multimodal_to.adam.tree import Joint, Link, Tree
-from multimodal_to.adam.urdf import read_urdf
+from multimodal_to.adam.urdf import read_urdf, unread_elements
 
 EFFORT_PLACEHOLDER = 1e4
 """No joint of a robot that walks gives this much [N m or N]."""
@@ -94,7 +94,13 @@ def describe(
                 locked.setdefault(joint.name, 0.0)
         joint_names = [joint.name for joint in joints if joint.kind != "fixed" and joint.name not in locked]
     tree = build_tree(links, joints, joint_names, locked)
-    return Description(tree=tree, branches=_branches(tree, links, joints), findings=findings(tree, links, joints))
+    unread = (
+        Finding(subject=owner, text=f"holds {elements}, which is not known and not read")
+        for owner, elements in unread_elements(urdf)
+    )
+    return Description(
+        tree=tree, branches=_branches(tree, links, joints), findings=(*unread, *findings(tree, links, joints))
+    )
 
 
 def findings(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tuple[Finding, ...]:

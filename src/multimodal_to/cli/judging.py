@@ -15,7 +15,7 @@ from rich.text import Text
 
 from multimodal_to.adam.inspection import describe
 from multimodal_to.auditing.audit import Audit, audit
-from multimodal_to.cli.common import File, RobotOption, app, described, loaded, out, writable
+from multimodal_to.cli.common import File, RobotOption, app, described, loaded, number_option, out, writable
 from multimodal_to.cli.completion import robots_or_urdfs
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import load_robot
@@ -94,7 +94,12 @@ def simulate(
         bool, typer.Option(help="Let a small stabiliser correct thrusts, contact forces and joints.")
     ] = True,
     delay: Annotated[
-        float, typer.Option(help="How far the motion follows the forces, from 0 to 1 intervals of the plan.")
+        float,
+        typer.Option(
+            parser=number_option,
+            metavar="FLOAT",
+            help="How far the motion follows the forces, from 0 to 1 intervals of the plan.",
+        ),
     ] = 0.0,
     torque_limits: Annotated[bool, typer.Option(help="Clip joint torques at the robot's effort limits.")] = True,
     robot: RobotOption = "",

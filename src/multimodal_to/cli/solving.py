@@ -24,8 +24,10 @@ from multimodal_to.cli.common import (
     chosen,
     described,
     loaded,
+    number_option,
     out,
     say,
+    whole_number_option,
     writable,
 )
 from multimodal_to.cli.expectation import expect
@@ -181,8 +183,12 @@ def solve(
             autocompletion=completion.robots_or_folders,
         ),
     ] = "",
-    max_iterations: Annotated[int, typer.Option(help="Most iterations.")] = 1000,
-    time_limit: Annotated[float, typer.Option(help="Most seconds in the solver.")] = 3600.0,
+    max_iterations: Annotated[
+        int, typer.Option(parser=whole_number_option, metavar="INTEGER", help="Most iterations.")
+    ] = 1000,
+    time_limit: Annotated[
+        float, typer.Option(parser=number_option, metavar="FLOAT", help="Most seconds in the solver.")
+    ] = 3600.0,
     linear_solver: Annotated[
         str,
         typer.Option(
