@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from multimodal_to.adam.lean_tree import build_tree
+from multimodal_to.adam.singular import described, massless_motions
 from multimodal_to.adam.tree import Joint, Link, Tree
 from multimodal_to.adam.urdf import read_urdf, unread_elements
 
@@ -118,6 +119,11 @@ def findings(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tupl
         if joint.kind != "fixed":
             texts += _joint_findings(joint, carried[joint.child] if joint.name in moving else None)
         found += [Finding(subject=f"joint '{joint.name}'", text=text) for text in texts]
+    child = {joint.name: joint.child for joint in joints}
+    for group in massless_motions(tree):
+        if len(group) > 1 or not group[0] or carried[child[group[0]]] > 0:  # else the joint itself has said it
+            subject, text = described(tree, group)
+            found.append(Finding(subject=subject, text=text))
     return tuple(found)
 
 
