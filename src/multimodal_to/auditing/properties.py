@@ -73,6 +73,7 @@ _PHYSICS = (
     Property(
         name="torque beyond effort",
         unit="N m",
+        of_joints=True,
         limit=4e-6,
         of=Of.MOMENT,
         reason="the effort limit of `robot.toml`, or the URDF's; the rest is for rounding",
@@ -125,6 +126,7 @@ _INTEGRATION = (
             unit=unit,
             limit=limit,
             of=of,
+            of_joints=name == "joint_positions",
             reason=_gap_reason(rate, limit),
             meaning=f"gain of `{name}` over an interval minus `{rate}` at its end × Δt",
         )
@@ -193,6 +195,7 @@ _ACTUATION_AND_CONTACT = (
     Property(
         name="joint range",
         unit="rad",
+        of_joints=True,
         limit=1e-6,
         reason=f"`lower` and `upper` in robot.toml: {_BOUND}",
         meaning="how far a joint is outside its range",
@@ -200,6 +203,7 @@ _ACTUATION_AND_CONTACT = (
     Property(
         name="joint speed",
         unit="rad/s",
+        of_joints=True,
         limit=1e-6,
         reason=f"`speed` in robot.toml: {_BOUND}",
         meaning="how far a joint's speed is above its greatest",

@@ -127,9 +127,11 @@ def simulate(
         out.print(
             f"inverse dynamics {where}: MuJoCo and RNEA differ by {difference:.1e} of the largest force", soft_wrap=True
         )
+    joints = f"joints {outcome.joint:.1f}° ({outcome.joint_name}), " if outcome.joint_name else ""
+    slides = f"sliding joints {100 * outcome.slide:.1f} cm ({outcome.slide_name}), " if outcome.slide_name else ""
     out.print(
         f"largest errors over {plan.duration:.2f} s: CoM {100 * outcome.com:.1f} cm, base {outcome.attitude:.1f}°, "
-        f"joints {outcome.joint:.1f}° ({outcome.joint_name}), thrust {outcome.thrust:.1f} N",
+        f"{joints}{slides}thrust {outcome.thrust:.1f} N",
         soft_wrap=True,
     )
     beyond = "clipped" if outcome.clipped else "not clipped, beyond it"

@@ -14,6 +14,7 @@ from multimodal_to.doctor.balance import LONG_LEVER, Residual, residual
 from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
 from multimodal_to.doctor.search import search
 from multimodal_to.doctor.task import Task
+from multimodal_to.models.joint_units import joint_units
 from multimodal_to.models.robot import Posture
 from multimodal_to.ocp import paper
 from multimodal_to.ocp.knot import Knot
@@ -54,11 +55,13 @@ def trim(task: Task) -> Iterator[Symptom]:
                 "clear of the ground there",
             )
         else:
-            turned = np.abs(found.joint_positions - posture.joint_positions)
+            moved = np.abs(found.joint_positions - posture.joint_positions)
+            most = int(moved.argmax())
+            amount = f"{moved[most]:.2f} {joint_units(task.robot, 'rad')[most]}"
             yield note(
                 "hover trim",
                 f"the posture as it stands cannot hover, thrusts leave {here} over; one with "
-                f"{task.robot.joint_names[int(turned.argmax())]} moved by {turned.max():.2f} rad can, at the {when}",
+                f"{task.robot.joint_names[most]} moved by {amount} can, at the {when}",
             )
 
 

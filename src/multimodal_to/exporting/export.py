@@ -13,8 +13,9 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import OutputError
 from multimodal_to.files.writing import whole
+from multimodal_to.models.joint_units import described
 from multimodal_to.models.robot import Robot
-from multimodal_to.trajectory import QUANTITIES, Trajectory, labels, row_labels
+from multimodal_to.trajectory import QUANTITIES, Quantity, Trajectory, labels, row_labels, row_units
 from multimodal_to.trajectory.derived import JOINT_TORQUES, base_poses, joint_torques, sampled
 
 _NAMES = ("joint_names", "contact_names", "jet_names")
@@ -43,11 +44,15 @@ def columns(robot: Robot, trajectory: Trajectory) -> dict[str, tuple[str, Array]
     torques, trajectory = joint_torques(robot, trajectory), sampled(trajectory)
     table = {"time": ("s", trajectory.time)}
     for name, quantity in QUANTITIES.items():
-        for row, label in enumerate(labels(name, trajectory, separator=".")):
+        rows = labels(name, trajectory, separator=".")
+        for label, unit, values in zip(
+            rows, row_units(quantity, robot, len(rows)), getattr(trajectory, name), strict=True
+        ):
             place = label.replace(" ", "_") if quantity.of == "jet" else label
-            table[".".join(filter(None, (name, place)))] = (quantity.unit, getattr(trajectory, name)[row])
-    for joint, values in zip(row_labels(trajectory, JOINT_TORQUES.of, JOINT_TORQUES.axes), torques, strict=True):
-        table[f"joint_torques.{joint}"] = (JOINT_TORQUES.unit, values)
+            table[".".join(filter(None, (name, place)))] = (unit, values)
+    names = row_labels(trajectory, JOINT_TORQUES.of, JOINT_TORQUES.axes)
+    for joint, unit, values in zip(names, row_units(JOINT_TORQUES, robot), torques, strict=True):
+        table[f"joint_torques.{joint}"] = (unit, values)
     return table
 
 
@@ -72,7 +77,7 @@ def write_csv(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
 def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
     """Write a MATLAB file (version 5): every quantity and the joint torques, (rows, knots + 1), names, units.
 
-    Names are cells; units are a struct.
+    Names are cells; units are a struct, with one text for a quantity or, where joints differ, a cell for each of them.
 
     Args:
         robot: the robot of the trajectory, for the torques.
@@ -91,7 +96,10 @@ def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
         "robot": trajectory.robot,
         "scenario": trajectory.scenario,
         "conventions": "\n".join(CONVENTIONS),
-        "units": {name: quantity.unit for name, quantity in {**QUANTITIES, "joint_torques": JOINT_TORQUES}.items()},
+        "units": {
+            name: _mat_units(quantity, robot)
+            for name, quantity in {**QUANTITIES, "joint_torques": JOINT_TORQUES}.items()
+        },
         "time": trajectory.time,
         **{name: np.array(getattr(trajectory, name), dtype=object) for name in _NAMES},
         **{name: getattr(trajectory, name) for name in QUANTITIES},
@@ -102,11 +110,17 @@ def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
     return Path(path)
 
 
+def _mat_units(quantity: Quantity, robot: Robot) -> str | Array:
+    """Return the unit of a quantity, or the cells of its rows' units where they are not all the same."""
+    units = row_units(quantity, robot)
+    return np.array(units, dtype=object) if len(set(units)) > 1 else next(iter(units), quantity.unit)
+
+
 def write_mujoco(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
     """Write an `.npz` with MuJoCo's qpos, qvel and ctrl for a free base, a row for each knot, and `conventions`.
 
     qpos = (p, quaternion w x y z, s); qvel = (ṗ in world axes, ω in the base's axes, ṡ); ctrl = (joint torques by
-    inverse dynamics [N m], thrusts [N]). Joints and jets are in the order of `joint_names` and `jet_names`.
+    inverse dynamics [N m or N], thrusts [N]). Joints and jets are in the order of `joint_names` and `jet_names`.
 
     Args:
         robot: the robot of the trajectory, for the torques.
@@ -129,9 +143,10 @@ def write_mujoco(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[s
         path,
         parts,
         (
-            "qpos = (base position [m], quaternion w x y z, joints [rad]).",
-            "qvel = (base's linear velocity in world axes [m/s], angular in its own axes [rad/s], joints [rad/s]).",
-            "ctrl = (joint torques [N m], thrusts [N]).",
+            f"qpos = (base position [m], quaternion w x y z, joints [{described(robot, 'rad')}]).",
+            "qvel = (base's linear velocity in world axes [m/s], angular in its own axes [rad/s], joints "
+            f"[{described(robot, 'rad/s')}]).",
+            f"ctrl = (joint torques [{described(robot, 'N m')}], thrusts [N]).",
         ),
     )
 
@@ -163,9 +178,10 @@ def write_pinocchio(robot: Robot, trajectory: Trajectory, path: str | os.PathLik
         path,
         parts,
         (
-            "q = (base position [m], quaternion x y z w, joints [rad]).",
-            "v = (base's linear velocity [m/s] and angular velocity [rad/s], both in its own axes, joints [rad/s]).",
-            "tau = joint torques [N m].",
+            f"q = (base position [m], quaternion x y z w, joints [{described(robot, 'rad')}]).",
+            "v = (base's linear velocity [m/s] and angular velocity [rad/s], both in its own axes, joints "
+            f"[{described(robot, 'rad/s')}]).",
+            f"tau = joint torques [{described(robot, 'N m')}].",
         ),
     )
 

@@ -18,8 +18,10 @@ from multimodal_to.ocp.terms import (
     Constraint,
     Cost,
     IntervalFunction,
+    JointUnits,
     KnotFunction,
     Labels,
+    Units,
     Where,
     at_least,
     at_most,
@@ -159,7 +161,7 @@ BASE_ORIENTATION_INTEGRATION = Constraint(
 JOINT_INTEGRATION = Constraint(
     value=constraints.joint_integration,
     within=equal(),
-    unit="rad",
+    unit=JointUnits("rad"),
     holds=Where.EVERY_INTERVAL,
     labels=_each("joint"),
 )
@@ -278,7 +280,7 @@ def weight_of(name: str) -> Callable[[Parameters], float | Array]:
 
 def running(
     residual: KnotFunction | IntervalFunction,
-    unit: str | tuple[str, ...],
+    unit: Units,
     *charged: Where,
     scale: float = 1.0,
 ) -> Cost:
@@ -295,7 +297,7 @@ def running(
     return Cost(residual=residual, weight=weight_of(name), unit=unit, charged=places, scale=scale)
 
 
-def _once(name: str, residual: KnotFunction | IntervalFunction, unit: str, where: Where = Where.LAST_KNOT) -> Cost:
+def _once(name: str, residual: KnotFunction | IntervalFunction, unit: Units, where: Where = Where.LAST_KNOT) -> Cost:
     """Return a cost that is charged once."""
     return Cost(name=name, residual=residual, weight=weight_of(name), unit=unit, charged=where, per_second=False)
 
@@ -308,16 +310,16 @@ COSTS = (
     running(costs.angular_momentum, "kg m²/s"),
     running(costs.angular_momentum_rate, "N m", Where.EVERY_INTERVAL),
     running(costs.base_acceleration, _TWIST_RATE, Where.EVERY_INTERVAL),
-    running(costs.joint_velocities, "rad/s"),
-    running(costs.posture, "rad"),
+    running(costs.joint_velocities, JointUnits("rad/s")),
+    running(costs.posture, JointUnits("rad")),
     running(costs.base_orientation, "1"),
     running(costs.contact_forces, "N", Where.FIRST_KNOT, Where.LATER_KNOTS, scale=50.0),
     running(costs.contact_force_rates, "N/s", Where.EVERY_INTERVAL, scale=50.0),
     running(costs.thrust, "N", scale=100.0),
     running(costs.thrust_rate, "N/s", scale=50.0),
     running(costs.throttle, "%", scale=50.0),
-    _once("initial_posture", costs.posture, "rad", Where.FIRST_KNOT),
-    _once("final_posture", costs.posture, "rad"),
+    _once("initial_posture", costs.posture, JointUnits("rad"), Where.FIRST_KNOT),
+    _once("final_posture", costs.posture, JointUnits("rad")),
     _once("final_com_velocity", costs.com_velocity, "m/s"),
     _once("final_com_acceleration", costs.com_acceleration, "m/s²", Where.LAST_INTERVAL),
     _once("final_angular_momentum", costs.angular_momentum, "kg m²/s"),

@@ -11,6 +11,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import FormulationError, ScenarioError, unknown
+from multimodal_to.models.joint_units import either
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import QUANTITIES
@@ -118,9 +119,11 @@ class Bounds:
         target = np.broadcast_to(np.asarray(value, dtype=float), self.lower[name][:, knot].shape)
         low, high = self.lower[name][:, knot], self.upper[name][:, knot]
         if bad := np.flatnonzero((target < low - 1e-9) | (target > high + 1e-9)).tolist():
+            quantity = QUANTITIES[name]
+            unit = either(quantity.unit) if quantity.of == "joint" else quantity.unit
             raise ScenarioError(
                 f"{name}[{bad[0]}] has to be {target[bad[0]]:.6g} at knot {knot}, outside its range "
-                f"{low[bad[0]]:.6g} to {high[bad[0]]:.6g} {QUANTITIES[name].unit}"
+                f"{low[bad[0]]:.6g} to {high[bad[0]]:.6g} {unit}"
             )
         self.lower[name][:, knot] = np.clip(target - within, low, high)
         self.upper[name][:, knot] = np.clip(target + within, low, high)
