@@ -31,16 +31,14 @@ def either(unit: str) -> str:
     return f"{unit} or {SLIDING[unit]}"
 
 
-def described(robot: Robot, unit: str) -> str:
-    """Return the unit of a value of a robot's joints in words: `rad`, `m`, or `rad, of mast m`.
+def described(sliding: Mapping[str, bool], unit: str) -> str:
+    """Return the unit of a value of joints in words: `rad`, `m`, or `rad, of mast m`.
 
     Args:
-        robot: whose joints.
-        unit: of a revolute joint's value, one of `SLIDING`.
+        sliding: whether each joint slides, by name.
+        unit: of a joint that turns, one of `SLIDING`.
     """
-    sliding = [name for name, slider in zip(robot.joint_names, slides(robot), strict=True) if slider]
-    if not sliding:
+    names = [name for name, slider in sliding.items() if slider]
+    if not names:
         return unit
-    return (
-        SLIDING[unit] if len(sliding) == len(robot.joint_names) else f"{unit}, of {', '.join(sliding)} {SLIDING[unit]}"
-    )
+    return SLIDING[unit] if len(names) == len(sliding) else f"{unit}, of {', '.join(names)} {SLIDING[unit]}"
