@@ -49,6 +49,7 @@ from multimodal_to.solving import Ipopt, Relaxation, Solution, relax
 from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.derived import largest_torques
 
 _VIOLATIONS_SHOWN = 5
@@ -222,6 +223,8 @@ def solve(
     chosen_solver = choose(linear_solver)  # before anything takes time
     console = Console(highlight=False, markup=False, emoji=False, quiet=quiet)
     the_robot = load_robot(task.robot)
+    if resume is not None and task.start is not None:
+        the_robot = under_conditions(the_robot, task.start)
     _refuse_hopeless(examine(the_robot, scenario, task.formulation), console, force)
     folder = writable(output or (Path("results") / scenario.name if resume is None else resume.parent))
     started = time.perf_counter()
