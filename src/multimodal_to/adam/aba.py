@@ -10,12 +10,10 @@ from collections.abc import Mapping
 
 import casadi as cs
 
-from multimodal_to.adam.centroidal import composite_inertias
 from multimodal_to.adam.kinematics import Pose, joint_pose
 from multimodal_to.adam.rnea import applied_wrenches
 from multimodal_to.adam.spatial import SX, Inertia, symmetric
 from multimodal_to.adam.tree import BASE, Tree
-from multimodal_to.errors import ModelError
 
 
 def forward_dynamics(
@@ -93,19 +91,6 @@ def forward_dynamics(
     result[:3] = base.rotation @ accelerations[BASE][:3] + gravity
     result[3:6] = base.rotation @ accelerations[BASE][3:]
     return result
-
-
-def refuse_massless_joints(tree: Tree) -> None:
-    """Refuse a robot that ABA would divide by nothing for.
-
-    Raises:
-        ModelError: a joint moves nothing that has mass, so that its acceleration is undefined.
-    """
-    composites = composite_inertias(tree, cs.DM.ones(len(tree.joints)))
-    for body, composite in zip(tree.bodies[1:], composites[1:], strict=True):
-        moved = composite.mass if body.prismatic else composite.about_origin[2, 2]
-        if float(moved) <= 0:
-            raise ModelError(f"joint '{body.joint}' moves nothing that has mass, so its acceleration is undefined")
 
 
 def _spatial(inertia: Inertia) -> SX:

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from multimodal_to.adam.lean_tree import build_tree
+from multimodal_to.adam.singular import described, massless_motions
 from multimodal_to.adam.tree import Joint, Link, Tree
-from multimodal_to.adam.urdf import read_urdf
+from multimodal_to.adam.urdf import read_urdf, unread_elements
 
 EFFORT_PLACEHOLDER = 1e4
 """No joint of a robot that walks gives this much [N m or N]."""
@@ -94,7 +95,13 @@ def describe(
                 locked.setdefault(joint.name, 0.0)
         joint_names = [joint.name for joint in joints if joint.kind != "fixed" and joint.name not in locked]
     tree = build_tree(links, joints, joint_names, locked)
-    return Description(tree=tree, branches=_branches(tree, links, joints), findings=findings(tree, links, joints))
+    unread = (
+        Finding(subject=owner, text=f"holds {elements}, which is not known and not read")
+        for owner, elements in unread_elements(urdf)
+    )
+    return Description(
+        tree=tree, branches=_branches(tree, links, joints), findings=(*unread, *findings(tree, links, joints))
+    )
 
 
 def findings(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tuple[Finding, ...]:
@@ -112,6 +119,11 @@ def findings(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tupl
         if joint.kind != "fixed":
             texts += _joint_findings(joint, carried[joint.child] if joint.name in moving else None)
         found += [Finding(subject=f"joint '{joint.name}'", text=text) for text in texts]
+    child = {joint.name: joint.child for joint in joints}
+    for group in massless_motions(tree):
+        if len(group) > 1 or not group[0] or carried[child[group[0]]] > 0:  # else the joint itself has said it
+            subject, text = described(tree, group)
+            found.append(Finding(subject=subject, text=text))
     return tuple(found)
 
 

@@ -26,6 +26,7 @@ from multimodal_to.models.terrain import FlatGround
 from multimodal_to.scenarios.data import stored
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.derived import (
     at_knots,
     at_velocities,
@@ -71,6 +72,8 @@ class Audit:
 def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None) -> Audit:
     """Check a trajectory against the physics of its robot.
 
+    Gravity and the robot's friction are those that the trajectory keeps; where it keeps none, the robot's.
+
     Args:
         robot: the robot that the trajectory is for.
         trajectory: as loaded from its file.
@@ -81,6 +84,7 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         InputError: the trajectory is for another robot, or the scenario allows more of a property that is not judged.
     """
     refuse_other_robot(trajectory, robot)
+    robot = under_conditions(robot, trajectory)
     scenario = scenario or stored(trajectory)
     phases = flight_phases(robot, trajectory)
     motion = Motion.of(robot, trajectory)
@@ -127,7 +131,7 @@ def _findings(worst: Sequence[Worst], motion: Motion, scenario: Scenario | None)
         Finding(
             name=entry.name,
             worst=entry.worst,
-            unit=PROPERTIES[entry.name].unit,
+            unit=PROPERTIES[entry.name].unit_for(motion.robot, entry.body),
             knot=entry.knot,
             body=entry.body,
             limit=max(_limit(entry.name, motion, scenario), allowances.get(entry.name, 0.0)),
@@ -232,7 +236,8 @@ def _integration(motion: Motion) -> list[Worst]:
     findings = []
     for name, rate, *_ in GAPS:
         gaps = np.diff(getattr(trajectory, name), axis=1) - getattr(trajectory, rate)[:, 1:] * steps
-        findings.append(worst_of(f"gap of {name}", largest(gaps), first=1))
+        joints = motion.robot.joint_names if name == "joint_positions" else ()
+        findings.append(worst_of(f"gap of {name}", np.abs(gaps) if joints else largest(gaps), joints, first=1))
     rotations = motion.base[:, :3, :3]
     turned = rotations[1:] @ rotations[:-1].transpose(0, 2, 1)
     gaps = turned - _rodrigues(trajectory.base_angular_velocity[:, 1:].T * steps[:, None])

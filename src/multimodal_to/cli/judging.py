@@ -15,11 +15,13 @@ from rich.text import Text
 
 from multimodal_to.adam.inspection import describe
 from multimodal_to.auditing.audit import Audit, audit
-from multimodal_to.cli.common import File, RobotOption, app, described, loaded, out, writable
+from multimodal_to.cli.common import File, RobotOption, app, described, loaded, number_option, out, writable
 from multimodal_to.cli.completion import robots_or_urdfs
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import load_robot
+from multimodal_to.trajectory.conditions import differences
 
+_SAID = 5  # so many differences of robots are printed
 robot_app = typer.Typer(help="Look at robots.", no_args_is_help=True)
 app.add_typer(robot_app, name="robot")
 
@@ -40,8 +42,10 @@ def audit_file(
     """
     the_robot, trajectory = loaded(file, robot)
     report, unusual = audit(the_robot, trajectory), trajectory.unusual_formulation()
+    others = differences(the_robot, trajectory)
     if as_json:
-        typer.echo(json.dumps({**_as_data(report), "formulation": unusual}, indent=2, ensure_ascii=False))
+        more = {"formulation": unusual, "planned_for": list(others)}
+        typer.echo(json.dumps({**_as_data(report), **more}, indent=2, ensure_ascii=False))
         raise typer.Exit(0 if report.holds else 1)
     narrow = [Column(title, no_wrap=True) for title in ("property", "worst", "limit", "unit", "knot")]
     table = Table(*narrow, "where", Column(no_wrap=True), box=None, pad_edge=False)
@@ -66,6 +70,10 @@ def audit_file(
         )
     if unusual:
         out.print(f"the problem had {unusual}; the audit does not judge these", soft_wrap=True)
+    for difference in others[:_SAID]:
+        out.print(f"planned for another robot: {difference}", soft_wrap=True)
+    if len(others) > _SAID:
+        out.print(f"and {len(others) - _SAID} more")
     raise typer.Exit(0 if report.holds else 1)
 
 
@@ -94,7 +102,12 @@ def simulate(
         bool, typer.Option(help="Let a small stabiliser correct thrusts, contact forces and joints.")
     ] = True,
     delay: Annotated[
-        float, typer.Option(help="How far the motion follows the forces, from 0 to 1 intervals of the plan.")
+        float,
+        typer.Option(
+            parser=number_option,
+            metavar="FLOAT",
+            help="How far the motion follows the forces, from 0 to 1 intervals of the plan.",
+        ),
     ] = 0.0,
     torque_limits: Annotated[bool, typer.Option(help="Clip joint torques at the robot's effort limits.")] = True,
     robot: RobotOption = "",
@@ -122,9 +135,11 @@ def simulate(
         out.print(
             f"inverse dynamics {where}: MuJoCo and RNEA differ by {difference:.1e} of the largest force", soft_wrap=True
         )
+    joints = f"joints {outcome.joint:.1f}° ({outcome.joint_name}), " if outcome.joint_name else ""
+    slides = f"sliding joints {100 * outcome.slide:.1f} cm ({outcome.slide_name}), " if outcome.slide_name else ""
     out.print(
         f"largest errors over {plan.duration:.2f} s: CoM {100 * outcome.com:.1f} cm, base {outcome.attitude:.1f}°, "
-        f"joints {outcome.joint:.1f}° ({outcome.joint_name}), thrust {outcome.thrust:.1f} N",
+        f"{joints}{slides}thrust {outcome.thrust:.1f} N",
         soft_wrap=True,
     )
     beyond = "clipped" if outcome.clipped else "not clipped, beyond it"

@@ -9,12 +9,23 @@ from typing import Annotated
 
 import typer
 
-from multimodal_to.cli.common import File, RobotOption, app, loaded, option_numbers, out, writable, writable_file
+from multimodal_to.cli.common import (
+    File,
+    RobotOption,
+    app,
+    loaded,
+    number_option,
+    option_numbers,
+    out,
+    writable,
+    writable_file,
+)
 from multimodal_to.cli.completion import exports, figures
 from multimodal_to.errors import InputError, OutputError, unknown
 from multimodal_to.exporting.export import EXPORTS
 from multimodal_to.models.robot import load_robot
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.conditions import under_conditions
 
 
 @app.command()
@@ -45,7 +56,7 @@ def plot(
     if figure not in (*FIGURES, "all"):
         raise InputError(unknown("figure", figure, (*FIGURES, "all")))
     opened = [loaded(file, robot) for file in files]
-    the_robot = load_robot(robot or opened[0][1].robot)
+    the_robot = under_conditions(load_robot(robot or opened[0][1].robot), opened[0][1])
     trajectories = [trajectory for _, trajectory in opened]
     writable(target.parent)
     for name in FIGURES if figure == "all" else (figure,):
@@ -73,7 +84,9 @@ def replay(
     mp4: Annotated[Path | None, typer.Option(help="Write an MP4 film.")] = None,
     snapshots: Annotated[Path | None, typer.Option(help="Write a PNG of the robot at several times.")] = None,
     times: Annotated[str, typer.Option(help="Times of the snapshots [s], as 0,2.5,7.")] = "",
-    fps: Annotated[float | None, typer.Option(help="Frames a second. [GIF 12.5, MP4 25]")] = None,
+    fps: Annotated[
+        float | None, typer.Option(parser=number_option, metavar="FLOAT", help="Frames a second. [GIF 12.5, MP4 25]")
+    ] = None,
     beside: Annotated[
         Path | None,
         typer.Option("--with", metavar="OTHER", help="Draw another trajectory of the robot with it, faint."),

@@ -15,7 +15,8 @@ from multimodal_to.adam.spatial import Array, homogeneous
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import Surface, frame_function
 from multimodal_to.trajectory import rules
-from multimodal_to.trajectory.quantities import QUANTITIES, SCALAR, Quantity
+from multimodal_to.trajectory.conditions import under_conditions
+from multimodal_to.trajectory.quantities import QUANTITIES, SCALAR, Quantity, row_units
 from multimodal_to.trajectory.resampling import resample
 from multimodal_to.trajectory.trajectory import Trajectory
 
@@ -70,9 +71,10 @@ class LargestTorque:
     """The largest torque that a motion asks of a joint's motor, either way."""
 
     joint: str
-    torque: float  # [N m], or [N] of a prismatic joint
+    torque: float  # [`unit`]
     when: float  # [s]
     effort: float  # the joint's limit in the same unit; inf where none is known
+    unit: str  # "N m", or "N" of a prismatic joint
 
     @property
     def over_effort(self) -> float:
@@ -319,7 +321,8 @@ def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
     mean velocity ν̄. C ν is a quadratic form c(ν), so this is ½ (c(ν⁻) + c(ν⁺)) = c(ν̄) + c(½ (ν⁺ − ν⁻)). It is what
     the momentum's rows say. With c(ν̄) alone the wrench left for the base is several times larger.
     """
-    robot, count = robot.with_jets(trajectory.jet_names), trajectory.time.size
+    robot = under_conditions(robot.with_jets(trajectory.jet_names), trajectory)
+    count = trajectory.time.size
     names = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
     velocities = np.vstack([at_knots(trajectory, name) for name in names])
     accelerations = np.vstack([accelerations_at_knots(trajectory, name) for name in names])
@@ -381,7 +384,11 @@ def largest_torques(robot: Robot, trajectory: Trajectory) -> tuple[LargestTorque
     known = np.delete(np.arange(trajectory.time.size), without_acceleration(trajectory))
     torques, times = np.abs(joint_torques(robot, trajectory)[:, known]), trajectory.time[known]
     found = [
-        LargestTorque(joint=name, torque=float(row.max()), when=float(times[row.argmax()]), effort=float(effort))
-        for name, row, effort in zip(robot.joint_names, torques, robot.joint_limits.effort, strict=True)
+        LargestTorque(
+            joint=name, torque=float(row.max()), when=float(times[row.argmax()]), effort=float(effort), unit=unit
+        )
+        for name, row, effort, unit in zip(
+            robot.joint_names, torques, robot.joint_limits.effort, row_units(JOINT_TORQUES, robot), strict=True
+        )
     ]
     return tuple(sorted(found, key=lambda one: (-one.over_effort, -one.torque)))
