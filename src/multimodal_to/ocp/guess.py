@@ -25,7 +25,7 @@ PLACES_WEIGHT = 30.0
 _TILT_MAX = 0.6
 """How far the base may turn from home about each axis to stand on a slope [rad]."""
 
-LANDED = 0.4
+LANDED = 0.3
 """Share of the horizon in which a motion from the air to the ground comes down [1]."""
 
 

@@ -178,7 +178,7 @@ def step_up() -> Scenario:
         title="Flying up onto a step",
         initial_com=(0.0, 0.0, 0.72),
         final_com=(-0.4, 0.0, 0.67),
-        weights=replace(from_air.weights, joint_velocities=legs, foot_tilt=1e6, skimming=3e6),
+        weights=replace(from_air.weights, joint_velocities=legs, foot_tilt=1e6, skimming=1e7),
         surface=Stairs(edges=(0.2,), heights=(0.0, 0.1), direction=(-1.0, 0.0), width=0.06),
     )
 
