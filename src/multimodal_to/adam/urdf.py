@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from multimodal_to.adam.lean_tree import build_tree
+from multimodal_to.adam.lean_tree import build_tree, independent
 from multimodal_to.adam.tree import Joint, Link, Mimic, Tree
 from multimodal_to.errors import ModelError, listed, shortened
 from multimodal_to.files.reading import read_bytes
@@ -45,7 +45,8 @@ def load_tree(
 
     Args:
         urdf: a path, or the XML text itself.
-        joint_names: the joints that move, in the order of s; by default all that can, in the order of the file.
+        joint_names: the joints that move on their own, in the order of s; by default all that can, in the order of the
+            file. A mimic joint follows its leader, and is none of them.
         locked: positions [rad or m] of joints that can move but are not in `joint_names`; zero where not given.
 
     Raises:
@@ -55,7 +56,7 @@ def load_tree(
     if isinstance(joint_names, str):
         raise ModelError(f"the joints that move are given as the text '{joint_names}'; expected a list of names")
     if joint_names is None:
-        joint_names = [joint.name for joint in joints if joint.kind != "fixed" and joint.name not in (locked or {})]
+        joint_names = independent(joints, locked or {})
     return build_tree(links, joints, joint_names, locked)
 
 
@@ -275,8 +276,8 @@ def _joint(joint: Any) -> Joint:
 def _limits(joint: Any) -> tuple[dict[str, float], tuple[str, ...]]:
     """Return the limits with URDF's defaults, 0 for a range that is not written, and remarks on what is missing.
 
-    A continuous joint has no range. No <limit> at all means no limits, and so does a missing effort or velocity,
-    though URDF wants both.
+    A continuous joint has no range, and a mimic joint that states none has what its leader's leaves it. No <limit> at
+    all means no limits, and so does a missing effort or velocity, though URDF wants both.
     """
     if joint.type == "fixed":
         return {}, ()
@@ -284,7 +285,8 @@ def _limits(joint: Any) -> tuple[dict[str, float], tuple[str, ...]]:
         return {}, () if joint.type == "continuous" else ("has no <limit>, so no limits",)
     remarks = tuple(f"states no limit of {key}" for key in ("effort", "velocity") if getattr(joint.limit, key) is None)
     limits = {key: getattr(joint.limit, key) for key in ("effort", "velocity")}
-    if joint.type != "continuous":
+    bounded = joint.mimic is None or not (joint.limit.lower is joint.limit.upper is None)
+    if joint.type != "continuous" and bounded:
         limits |= {key: getattr(joint.limit, key) or 0.0 for key in ("lower", "upper")}
         if limits["lower"] > limits["upper"]:
             raise ModelError(
