@@ -18,6 +18,7 @@ from multimodal_to.adam import urdf
 from multimodal_to.auditing import PROPERTIES, Judged, Of, Property
 from multimodal_to.files.keys import Key
 from multimodal_to.files.reading import LARGEST_TOML
+from multimodal_to.models.joint_units import either
 from multimodal_to.models.robot import load_robot
 from multimodal_to.models.robot_keys import robot_keys
 from multimodal_to.models.terrain import MOST_NODES
@@ -58,7 +59,7 @@ def quantities() -> str:
             (
                 f"`{name}`",
                 _shape(quantity.rows, _COUNTS[quantity.of]),
-                quantity.unit,
+                either(quantity.unit) if quantity.of == "joint" else quantity.unit,
                 quantity.frame or "–",
                 _INSTANTS[rules.instant(rules.LEAPFROG, name)],
                 quantity.meaning,
@@ -153,7 +154,8 @@ def properties() -> str:
 
 
 def _limit(entry: Property) -> str:
-    share = entry.unit if entry.of is Of.UNIT else entry.of.value
+    unit = either(entry.unit) if entry.of_joints else entry.unit
+    share = unit if entry.of is Of.UNIT else entry.of.value
     margin = "" if entry.margin is None else f"`margins.{entry.margin}` + "
     others = {
         "second-order cone": entry.second_order_limit,
@@ -231,7 +233,9 @@ def _formula(term: Constraint | Cost) -> str:
 
 
 def _units(term: Constraint | Cost) -> str:
-    return term.unit if isinstance(term.unit, str) else ", ".join(dict.fromkeys(term.unit))
+    if isinstance(term.unit, str) or callable(term.unit):
+        return str(term.unit)
+    return ", ".join(dict.fromkeys(term.unit))
 
 
 def _set(term: Constraint, parameters: Parameters) -> str:

@@ -1,13 +1,17 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import fields, replace
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from adam_robots import IRONCUB
+from hopper import hopper
+from multimodal_to.adam import KinDynComputations
+from multimodal_to.errors import InputError
 from multimodal_to.exporting import export
+from multimodal_to.models.robot import JointLimits
 from multimodal_to.trajectory import QUANTITIES
 from multimodal_to.trajectory.derived import frame_poses, generalised_forces, joint_torques
 from synthetic import KNOTS, take_off
@@ -16,8 +20,6 @@ from synthetic import KNOTS, take_off
 @pytest.fixture(scope="module")
 def trajectory(ironcub):
     """A motion with velocities of its own, so that no axis is at zero."""
-    from dataclasses import replace
-
     rng = np.random.default_rng(4)
     plain = take_off(ironcub)
     names = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
@@ -52,24 +54,113 @@ def test_a_matlab_file_holds_arrays_names_and_units(ironcub, trajectory, tmp_pat
     assert "backward Euler" in content["conventions"]
 
 
-def test_pinocchio_puts_the_robot_where_we_do_and_moves_it_as_we_do(ironcub, trajectory, tmp_path):
-    with np.load(export.write_pinocchio(ironcub, trajectory, tmp_path / "p.npz"), allow_pickle=False) as archive:
-        q, v, names = archive["q"], archive["v"], [str(name) for name in archive["joint_names"]]
-        assert "own axes" in str(archive["conventions"])
-        np.testing.assert_array_equal(archive["tau"].T, generalised_forces(ironcub, trajectory)[6:])
-    model = pin.buildModelFromUrdf(str(IRONCUB / "ironcub.urdf"), pin.JointModelFreeFlyer())
+def read(path):
+    with np.load(path, allow_pickle=False) as archive:
+        return {name: archive[name] for name in archive}
+
+
+def agrees_with_pinocchio(robot, trajectory, path):
+    """Frames, velocities and torques of what is exported, put straight into Pinocchio's own model of the URDF."""
+    found = read(export.write_pinocchio(robot, trajectory, path))
+    model = pin.buildModelFromUrdf(str(robot.urdf), pin.JointModelFreeFlyer())
+    model.gravity.linear = robot.gravity
     data = model.createData()
-    order = [names.index(name) for name in list(model.names)[2:]]
-    poses = frame_poses(ironcub, trajectory, "l_sole")
+    assert (found["q"].shape[1], found["v"].shape[1]) == (model.nq, model.nv)
+    assert tuple(found["joint_names"]) == tuple(model.names)[2:]
+    base, feet = robot.kindyn.tree.base, robot.contact_names
     for knot in (0, 7, KNOTS):
-        here = np.concatenate([q[knot, :7], q[knot, 7:][order]])
-        moving = np.concatenate([v[knot, :6], v[knot, 6:][order]])
-        pin.forwardKinematics(model, data, here, moving)
+        pin.forwardKinematics(model, data, found["q"][knot], found["v"][knot])
         pin.updateFramePlacements(model, data)
-        np.testing.assert_allclose(data.oMf[model.getFrameId("l_sole")].homogeneous, poses[knot], atol=1e-9)
-        twist = pin.getFrameVelocity(model, data, model.getFrameId("root_link"), pin.LOCAL_WORLD_ALIGNED)
+        for name in (*feet, *(jet.frame for jet in robot.jets)):
+            placed = data.oMf[model.getFrameId(name)].homogeneous
+            np.testing.assert_allclose(placed, frame_poses(robot, trajectory, name)[knot], atol=1e-9)
+        twist = pin.getFrameVelocity(model, data, model.getFrameId(base), pin.LOCAL_WORLD_ALIGNED)
         np.testing.assert_allclose(twist.linear, trajectory.base_linear_velocity[:, knot], atol=1e-12)
         np.testing.assert_allclose(twist.angular, trajectory.base_angular_velocity[:, knot], atol=1e-12)
+        acceleration = np.zeros(model.nv)
+        still = pin.rnea(model, data, found["q"][knot], np.zeros(model.nv), acceleration)
+        pushes = np.zeros(model.nv)
+        for name, force in zip(feet, trajectory.per_contact("contact_forces")[:, :, knot], strict=True):
+            jacobian = pin.computeFrameJacobian(
+                model, data, found["q"][knot], model.getFrameId(name), pin.LOCAL_WORLD_ALIGNED
+            )
+            pushes += jacobian[:3].T @ force
+        yield found, knot, still - pushes
+
+
+def test_pinocchio_puts_the_robot_where_we_do_and_moves_it_as_we_do(ironcub, trajectory, tmp_path):
+    for found, _, _ in agrees_with_pinocchio(ironcub, trajectory, tmp_path / "p.npz"):
+        names = [str(name) for name in found["joint_names"]]
+        assert "own axes" in str(found["conventions"])
+        order = [ironcub.joint_names.index(name) for name in names]
+        np.testing.assert_array_equal(found["tau"].T, generalised_forces(ironcub, trajectory)[6:][order])
+
+
+def test_pinocchio_gets_cosines_of_continuous_joints_and_those_that_are_locked(tmp_path):
+    """A wing that turns without end, a mast that slides and is locked at 0.15 m: Pinocchio's model moves all three."""
+    robot = hopper(tmp_path / "mast", mast=True, kinds=("continuous", "revolute"))
+    text = (tmp_path / "mast" / "hopper.urdf").read_text(encoding="utf-8")
+    kindyn = KinDynComputations(text, ["right_pitch", "left_pitch"], locked_joints={"mast": 0.15})
+    keep = [2, 0]
+    limits = JointLimits(**{f.name: getattr(robot.joint_limits, f.name)[keep] for f in fields(JointLimits)})
+    home = replace(robot.home, joint_positions=robot.home.joint_positions[keep])
+    robot = replace(robot, kindyn=kindyn, joint_limits=limits, home=home, joint_groups={})
+    plan = take_off(robot)
+    still = replace(plan, **{name: 0.0 * getattr(plan, name) for name in STILL}, thrust=0.0 * plan.thrust)
+    for found, knot, torques in agrees_with_pinocchio(robot, still, tmp_path / "p.npz"):
+        assert tuple(found["joint_names"]) == ("left_pitch", "mast", "right_pitch")
+        angle = still.joint_positions[1, knot]
+        np.testing.assert_allclose(found["q"][knot, 7:10], [np.cos(angle), np.sin(angle), 0.15])
+        if 0 < knot < KNOTS:
+            np.testing.assert_allclose(found["tau"][knot], torques[6:], atol=1e-8)
+
+
+STILL = ("base_linear_velocity", "base_angular_velocity", "joint_velocities", "com_velocity", "angular_momentum")
+
+
+def wild(seed):
+    """A URDF of links, joints and names in no order, with fixed joints between."""
+    rng = np.random.default_rng(seed)
+    inertial = (
+        '<inertial><origin xyz="0 0 0.1"/><mass value="1"/>'
+        '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+    parts = [f'<link name="l{index}">{inertial}</link>' for index in range(9)]
+    for index in range(1, 9):
+        kind = rng.choice(["fixed", "revolute", "continuous", "prismatic"])
+        name = f"{rng.choice(list('abzAZ_9é'))}{index}"
+        parts.append(
+            f'<joint name="{name}" type="{kind}"><parent link="l{rng.integers(index)}"/><child link="l{index}"/>'
+            '<axis xyz="0 0.6 0.8"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+        )
+    return f'<robot name="wild">{"".join(rng.permutation(parts))}</robot>'
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_order_of_joints_is_that_of_the_programs_own_models(tmp_path, seed):
+    mujoco = pytest.importorskip("mujoco")
+    file = tmp_path / "wild.urdf"
+    file.write_text(wild(seed), encoding="utf-8")
+    robot = hopper(tmp_path / "any")
+    jets = tuple(replace(jet, frame="l0") for jet in robot.jets)
+    contacts = tuple(replace(contact, frame=f"l{index}") for index, contact in enumerate(robot.contacts))
+    robot = replace(robot, urdf=file, kindyn=KinDynComputations(file), jets=jets, contacts=contacts)
+    plan = take_off(robot)
+    spec = mujoco.MjSpec.from_string(wild(seed))
+    spec.worldbody.first_body().add_freejoint()
+    model = spec.compile()
+    own = [model.joint(index).name for index in range(1, model.njnt)]
+    assert read(export.write_mujoco(robot, plan, tmp_path / "m.npz"))["joint_names"].tolist() == own
+    peer = pin.buildModelFromXML(wild(seed), pin.JointModelFreeFlyer())
+    found = read(export.write_pinocchio(robot, plan, tmp_path / "p.npz"))
+    assert found["joint_names"].tolist() == list(peer.names)[2:]
+    assert (found["q"].shape[1], found["v"].shape[1]) == (peer.nq, peer.nv)
+
+
+def test_a_motion_of_another_robot_is_not_exported(ironcub, trajectory, tmp_path):
+    for write in (export.write_pinocchio, export.write_mujoco):
+        with pytest.raises(InputError, match="for another robot"):
+            write(hopper(tmp_path / "hopper"), trajectory, tmp_path / "p.npz")
 
 
 def test_mujoco_has_the_scalar_first_and_only_the_angular_velocity_in_the_base(ironcub, trajectory, tmp_path):

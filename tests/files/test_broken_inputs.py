@@ -237,7 +237,7 @@ BROKEN = {
     # options
     "an unknown option": option("audit good.npz --josn", None, "No such option: --josn", "--json"),
     "an unknown command": option("adit good.npz", None, "No such command 'adit'"),
-    "a word for a number": option("solve take-off --max-iterations many", None, "'--max-iterations'", "integer"),
+    "a word for a number": option("solve take-off --max-iterations many", None, "'--max-iterations'", "whole number"),
     "no iterations": option("solve take-off --max-iterations 0 -o out/new", InputError, "max_iterations is 0"),
     "a change without a value": option("solve take-off --set knots -o out/new", ScenarioError, "expected key=value"),
     "a change of nothing": option("solve take-off --set knotz=9", ScenarioError, "did you mean 'knots'?"),

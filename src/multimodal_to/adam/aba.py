@@ -15,7 +15,6 @@ from multimodal_to.adam.kinematics import Pose, joint_pose
 from multimodal_to.adam.rnea import applied_wrenches, inverse_dynamics
 from multimodal_to.adam.spatial import SX, Inertia, symmetric
 from multimodal_to.adam.tree import BASE, Tree
-from multimodal_to.errors import ModelError
 
 
 def forward_dynamics(
@@ -100,19 +99,6 @@ def forward_dynamics(
     result[:3] = base.rotation @ accelerations[BASE][:3] + gravity
     result[3:6] = base.rotation @ accelerations[BASE][3:]
     return result
-
-
-def refuse_massless_joints(tree: Tree) -> None:
-    """Refuse a robot that ABA would divide by nothing for.
-
-    Raises:
-        ModelError: a joint moves nothing that has mass, so that its acceleration is undefined.
-    """
-    n = len(tree.joints)
-    moved = cs.diag(mass_matrix(tree, Pose(cs.DM.eye(3), cs.DM.zeros(3)), cs.DM.ones(n)))
-    for joint, mass in zip(tree.joints, cs.vertsplit(moved[6:]) if n else [], strict=True):
-        if float(mass) <= 0:
-            raise ModelError(f"joint '{joint.name}' moves nothing that has mass, so its acceleration is undefined")
 
 
 def _solved(matrix: SX, right: SX) -> SX:

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from multimodal_to.adam.lean_tree import build_tree, independent
+from multimodal_to.adam.singular import described, massless_motions
 from multimodal_to.adam.tree import Joint, Link, Mimic, Tree
-from multimodal_to.adam.urdf import read_urdf
+from multimodal_to.adam.urdf import read_urdf, unread_elements
 
 EFFORT_PLACEHOLDER = 1e4
 """No joint of a robot that walks gives this much [N m or N]."""
@@ -93,7 +94,13 @@ def describe(
     if joint_names is None:
         joint_names = independent(joints, locked)
     tree = build_tree(links, joints, joint_names, locked)
-    return Description(tree=tree, branches=_branches(tree, links, joints), findings=findings(tree, links, joints))
+    unread = (
+        Finding(subject=owner, text=f"holds {elements}, which is not known and not read")
+        for owner, elements in unread_elements(urdf)
+    )
+    return Description(
+        tree=tree, branches=_branches(tree, links, joints), findings=(*unread, *findings(tree, links, joints))
+    )
 
 
 def findings(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tuple[Finding, ...]:
@@ -113,6 +120,10 @@ def findings(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tupl
         elif joint.kind != "fixed":
             texts += _joint_findings(moving.get(joint.name, joint), carried.get(joint.name))
         found += [Finding(subject=f"joint '{joint.name}'", text=text) for text in texts]
+    for group in massless_motions(tree):
+        if len(group) > 1 or not group[0] or carried[group[0]] > 0:  # else the joint itself has said it
+            subject, text = described(tree, group)
+            found.append(Finding(subject=subject, text=text))
     return tuple(found)
 
 

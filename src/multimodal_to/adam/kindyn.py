@@ -16,6 +16,7 @@ from multimodal_to.adam.kinematics import Chain
 from multimodal_to.adam.library import Library
 from multimodal_to.adam.quantity import of_frame, of_state, of_wrenches, quantity
 from multimodal_to.adam.representation import Representations, from_mixed, to_mixed_rate
+from multimodal_to.adam.singular import refuse_massless_motions
 from multimodal_to.adam.spatial import homogeneous, symmetric
 
 
@@ -230,9 +231,10 @@ class KinDynComputations(Library):
         """Return ν̇, (6 + n, 1), under joint torques and external wrenches (see `rnea`), by ABA.
 
         Raises:
-            ModelError: a joint moves nothing that has mass, so that its acceleration is undefined.
+            ModelError: a joint, the base or several of them move without moving any mass, so that their accelerations
+                are undefined; or they do so in this posture.
         """
-        aba.refuse_massless_joints(self.tree)
+        refuse_massless_motions(self.tree)
         base = self._base(base_transform)
         acceleration = aba.forward_dynamics(
             self.tree,

@@ -28,7 +28,7 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.library import Library
-from multimodal_to.errors import InputError
+from multimodal_to.errors import InputError, ModelError
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def quantity(formula: Formula) -> Formula:
     Raises (the method):
         InputError: an argument has another shape than `ARGUMENTS` says, or holds a NaN or an infinity; or CasADi does
             not take the library's `f_opts`.
-        ModelError: there is no such frame.
+        ModelError: there is no such frame, or the result is no finite number.
     """
     signature, name = inspect.signature(formula), formula.__name__
 
@@ -102,7 +102,13 @@ def quantity(formula: Formula) -> Formula:
         key = [arguments["frame"]] if "frame" in arguments else [tuple(wrenches)] if wrenches else []
         function = getattr(self, f"{name}_fun")(*key)
         values = [value for argument, value in arguments.items() if argument in ARGUMENTS]
-        return function(*(_checked(function, i, value) for i, value in enumerate([*values, *wrenches.values()])))
+        result = function(*(_checked(function, i, value) for i, value in enumerate([*values, *wrenches.values()])))
+        if isinstance(result, cs.DM) and not result.is_regular():
+            raise ModelError(
+                f"{name}: the result is no finite number; in this posture something moves without moving any mass, or "
+                "the arguments are too large"
+            )
+        return result
 
     meanings = {**_OTHERS, **{argument: of.meaning for argument, of in ARGUMENTS.items()}}
     lines = [f"    {argument}: {meanings[argument]}" for argument in signature.parameters if argument in meanings]

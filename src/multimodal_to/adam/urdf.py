@@ -14,8 +14,10 @@ import numpy as np
 from lxml import etree
 
 from multimodal_to.adam.lean_tree import build_tree, independent
+from multimodal_to.adam.leftovers import refuse_leftovers, unread
 from multimodal_to.adam.tree import Joint, Link, Mimic, Tree
 from multimodal_to.errors import ModelError, listed, shortened
+from multimodal_to.files.numbers import numbers
 from multimodal_to.files.reading import read_bytes
 
 LARGEST_URDF = 10_000_000
@@ -28,6 +30,8 @@ LARGEST_NUMBER = 1e9
 """No length [m], angle [rad], mass [kg] or inertia [kg m²] is larger; limits of joints may be."""
 
 _ENTITIES = "declares a document type, whose entities are not read; write out what they stand for"
+_TEXT = "the URDF text"
+_BLANK = " \t\r\n\v\f\ufeff"  # with the mark that some programs begin a file with
 _MOVING = ("revolute", "continuous", "prismatic")
 _SUPPORTED = (*_MOVING, "fixed")
 _NO_DIRECTION = 1e-6
@@ -78,31 +82,7 @@ def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
     """
     import yourdfpy  # takes longer to import than all the rest, and what reads no URDF does without
 
-    text, source = _read(urdf)
-    try:
-        # Entities are not expanded and nothing is fetched: a URDF from elsewhere is only text.
-        root = etree.fromstring(
-            text,
-            etree.XMLParser(
-                resolve_entities=False,
-                load_dtd=False,
-                no_network=True,
-                remove_comments=True,
-                remove_pis=True,
-            ),
-        )
-    except (etree.XMLSyntaxError, ValueError) as error:
-        if b"<!DOCTYPE" in text:  # whose entities the parser has stumbled over
-            raise ModelError(f"{source} {_ENTITIES}") from error
-        raise ModelError(f"{source} is not valid XML: {error}") from error
-    if root.getroottree().docinfo.internalDTD is not None:
-        raise ModelError(f"{source} {_ENTITIES}")
-    if root.tag != "robot":
-        raise ModelError(f"{source} is no URDF: its root element is <{root.tag}>, expected <robot>")
-    if (count := sum(1 for _ in root.iter())) > MOST_ELEMENTS:
-        raise ModelError(f"{source} has {count} elements; at most {MOST_ELEMENTS} are read")
-    if root.get("name") is None:
-        root.set("name", "robot")
+    root, source = _root(urdf)
     _keep_what_is_used(root)
     _check_names(root, source)
     _refuse_missing(root, source)
@@ -124,11 +104,55 @@ def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
         logger.setLevel(level)
 
 
+def unread_elements(urdf: str | os.PathLike[str]) -> tuple[tuple[str, str], ...]:
+    """Return the elements of a URDF that are not known, as (what they stand in, how many of which): nothing reads them.
+
+    Raises:
+        ModelError: as `parse_urdf` does.
+    """
+    return unread(_root(urdf)[0])
+
+
+def _root(urdf: str | os.PathLike[str]) -> tuple[Any, str]:
+    """Return the element <robot> of a URDF, of which nothing is left to expand, and what to call the URDF in errors.
+
+    The encoding that a file declares is the file's; a text has been decoded already, whatever it declares.
+    """
+    text, source = _read(urdf)
+    try:
+        # Entities are not expanded and nothing is fetched: a URDF from elsewhere is only text.
+        root = etree.fromstring(
+            text,
+            etree.XMLParser(
+                resolve_entities=False,
+                load_dtd=False,
+                no_network=True,
+                remove_comments=True,
+                remove_pis=True,
+                encoding="utf-8" if source == _TEXT else None,
+            ),
+        )
+    except (etree.XMLSyntaxError, ValueError) as error:
+        if b"<!DOCTYPE" in text:  # whose entities the parser has stumbled over
+            raise ModelError(f"{source} {_ENTITIES}") from error
+        raise ModelError(f"{source} is not valid XML: {error}") from error
+    if root.getroottree().docinfo.internalDTD is not None:
+        raise ModelError(f"{source} {_ENTITIES}")
+    if root.tag != "robot":
+        raise ModelError(f"{source} is no URDF: its root element is <{root.tag}>, expected <robot>")
+    if (count := sum(1 for _ in root.iter())) > MOST_ELEMENTS:
+        raise ModelError(f"{source} has {count} elements; at most {MOST_ELEMENTS} are read")
+    if root.get("name") is None:
+        root.set("name", "robot")
+    refuse_leftovers(root, source)
+    return root, source
+
+
 def _read(urdf: str | os.PathLike[str]) -> tuple[bytes, str]:
-    if isinstance(urdf, str) and urdf.lstrip().startswith("<"):
+    if isinstance(urdf, str) and (written := urdf.lstrip(_BLANK)).startswith("<"):
         if len(urdf) > LARGEST_URDF:
             raise ModelError(f"the URDF text is longer than {LARGEST_URDF / 1e6:g} MB, the most that is read")
-        return urdf.strip().encode("utf-8", errors="replace"), "the URDF text"
+        return written.rstrip().encode("utf-8", errors="replace"), _TEXT
     return read_bytes(urdf, LARGEST_URDF, ModelError), f"'{Path(urdf)}'"
 
 
@@ -222,12 +246,12 @@ def _number_fault(text: str, counts: Sequence[int], largest: float) -> str | Non
     """Return what is wrong with a text of numbers, as the end of a sentence about it."""
     finite = "is not a finite number" if counts == (1,) else f"is not {counts[-1]} finite numbers"
     try:
-        numbers = [float(word) for word in text.replace(",", " ").split()]
+        found = numbers(text)
     except ValueError:
         return finite
-    if len(numbers) not in counts or np.isnan(numbers).any():
+    if len(found) not in counts:
         return finite
-    greatest = max(map(abs, numbers))
+    greatest = max(map(abs, found))
     return None if greatest <= largest else finite if np.isinf(greatest) else f"is larger than {largest:g}"
 
 

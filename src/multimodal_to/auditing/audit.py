@@ -127,7 +127,7 @@ def _findings(worst: Sequence[Worst], motion: Motion, scenario: Scenario | None)
         Finding(
             name=entry.name,
             worst=entry.worst,
-            unit=PROPERTIES[entry.name].unit,
+            unit=PROPERTIES[entry.name].unit_for(motion.robot, entry.body),
             knot=entry.knot,
             body=entry.body,
             limit=max(_limit(entry.name, motion, scenario), allowances.get(entry.name, 0.0)),
@@ -232,7 +232,8 @@ def _integration(motion: Motion) -> list[Worst]:
     findings = []
     for name, rate, *_ in GAPS:
         gaps = np.diff(getattr(trajectory, name), axis=1) - getattr(trajectory, rate)[:, 1:] * steps
-        findings.append(worst_of(f"gap of {name}", largest(gaps), first=1))
+        joints = motion.robot.joint_names if name == "joint_positions" else ()
+        findings.append(worst_of(f"gap of {name}", np.abs(gaps) if joints else largest(gaps), joints, first=1))
     rotations = motion.base[:, :3, :3]
     turned = rotations[1:] @ rotations[:-1].transpose(0, 2, 1)
     gaps = turned - _rodrigues(trajectory.base_angular_velocity[:, 1:].T * steps[:, None])

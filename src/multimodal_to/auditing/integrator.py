@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Motion, Worst, worst_of
+from multimodal_to.models.attitude import continuous
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory, rules
 
@@ -134,7 +135,7 @@ class Controls:
         plan, jets = self.trajectory, len(self.robot.jets)
         names = ("com_position", "com_velocity", "angular_momentum", "base_quaternion_xyzw", "thrust", "thrust_rate")
         states = np.vstack([getattr(plan, name) for name in names]).T
-        states[:, _RHO] = _continuous(states[:, _RHO])
+        states[:, _RHO] = continuous(states[:, _RHO].T).T
         knots = np.arange(plan.time.size)
         with np.errstate(all="ignore"):
             slopes = self.slope(states, 2 * self.steps * knots, knots)
@@ -218,7 +219,7 @@ class Controls:
         plan, robot = self.trajectory, self.robot
         instants = _instants(plan.time, 2 * self.steps)
         thrust, _ = spline(plan.time, plan.thrust.T, instants)
-        quaternions, _ = spline(plan.time, _continuous(plan.base_quaternion_xyzw.T), instants)
+        quaternions, _ = spline(plan.time, plan.base_quaternion_xyzw.T, instants)
         thrusts = np.einsum("kij,kcj,kc->ki", rotations(quaternions), self.directions, thrust)
         columns = (np.arange(plan.knots)[:, None] + self.columns).ravel()
         contacts = plan.contact_forces.reshape(len(robot.contacts), 3, -1).sum(axis=0).T[columns]
@@ -287,9 +288,3 @@ def _instants(time: Array, parts: int) -> Array:
     """Return the knots' times and those that divide each interval into equal parts [s], (parts × intervals + 1,)."""
     shares = np.arange(parts) / parts
     return np.append((time[:-1, None] + np.diff(time)[:, None] * shares).ravel(), time[-1])
-
-
-def _continuous(quaternions: Array) -> Array:
-    """Return quaternions, (count, 4), with the signs with which each is the nearer one to that before it."""
-    turned = (quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0.0
-    return np.asarray(quaternions * np.cumprod(np.append(1.0, np.where(turned, -1.0, 1.0)))[:, None])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from multimodal_to.models.contact import FrictionCone
+from multimodal_to.models.joint_units import joint_units
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.sole import soles
 from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal
@@ -86,16 +87,28 @@ class Property:
     """One thing that an audit judges."""
 
     name: str
-    unit: str
+    unit: str  # of a joint that turns where the rows are joints
     limit: float  # largest value that holds, as a share of `of`
     reason: str  # where the limit comes from
     meaning: str  # what is compared with the limit
     judged: Judged = Judged.ALWAYS
     of: Of = Of.UNIT
+    of_joints: bool = False  # the body of a finding is a joint, which has its own unit
     margin: str | None = None  # of the scenario's `Margins`: the limit is that much more
     unasked: float = 0.0  # what stands for the margin where the scenario is not known or asks for none
     second_order_limit: float | None = None  # the limit under the second-order friction cone, where it is another one
     first_order_limit: float | None = None  # the limit by an integration rule of order one, where it is another one
+
+    def unit_for(self, robot: Robot, body: str) -> str:
+        """Return the unit of a finding: that of a joint goes by whether it turns or slides.
+
+        Args:
+            robot: whose motion it is.
+            body: of the finding, its joint where the property is one of joints.
+        """
+        if self.of_joints and body in robot.joint_names:
+            return joint_units(robot, self.unit)[robot.joint_names.index(body)]
+        return self.unit
 
     def limit_for(self, robot: Robot, scenario: Scenario | None, rule: str = rules.LEAPFROG) -> float:
         """Return the limit in `unit`.

@@ -6,6 +6,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Motion, Worst, worst_of
+from multimodal_to.models.attitude import tilt
 from multimodal_to.models.terrain import frame_function
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 from multimodal_to.trajectory.derived import at_knots, without_acceleration
@@ -112,10 +113,11 @@ def _hover(when: str, motion: Motion, knot: int) -> list[Worst]:
         knot: at which.
     """
     trajectory, weight = motion.trajectory, motion.robot.mass * motion.robot.gravity
-    tilt = 2 * np.abs(trajectory.base_quaternion_xyzw[:3, knot])
+    upright = motion.robot.upright.base_transform[:3, :3]
+    off = tilt(motion.base[knot, :3, :3], upright, motion.robot.up)
     return [
         _at(f"{when}: contact force", knot, np.abs(trajectory.contact_forces[:, knot])),
-        _at(f"{when}: base off upright", knot, tilt),
+        _at(f"{when}: base off upright", knot, np.array(off)),
         _at(f"{when}: thrust off weight", knot, np.abs(motion.thrusts[:, knot].sum(axis=0) + weight)),
         _at(f"{when}: thrust rate", knot, np.abs(trajectory.thrust_rate[:, knot])),
     ]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 import typer
 from rich.console import Console
@@ -14,7 +15,8 @@ from rich.text import Text
 
 from multimodal_to.auditing.audit import Audit
 from multimodal_to.cli.completion import robots_or_folders, scenarios_or_files
-from multimodal_to.errors import InputError, OutputError, TrajectoryError
+from multimodal_to.errors import InputError, OutputError, TrajectoryError, shortened
+from multimodal_to.files.numbers import number, whole_number
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.scenarios import find
 from multimodal_to.scenarios import paper as as_in_paper
@@ -33,6 +35,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 out = Console(highlight=False, markup=False, emoji=False)
+
+_Value = TypeVar("_Value", int, float)
 
 File = Annotated[Path, typer.Argument(help="Trajectory file, as `solve` writes it.")]
 ScenarioName = Annotated[
@@ -123,10 +127,35 @@ def writable_file(path: Path, suffix: str) -> None:
     writable(path.parent)
 
 
+def number_option(value: Any) -> float:
+    """Return the number of an option as XML and TOML write it, not as Python does: `1_5` and `nan` are none.
+
+    Raises:
+        InputError: it is no number.
+    """
+    return _read(number, value, "a number")
+
+
+def whole_number_option(value: Any) -> int:
+    """Return the whole number of an option.
+
+    Raises:
+        InputError: it is none.
+    """
+    return _read(whole_number, value, "a whole number")
+
+
+def _read(read: Callable[[str], _Value], value: Any, expected: str) -> _Value:
+    try:
+        return read(value) if isinstance(value, str) else value
+    except ValueError as error:
+        raise InputError(f"'{shortened(value, 60)}' is not {expected}") from error
+
+
 def option_numbers(option: str, text: str) -> list[float]:
     """Return the numbers of an option that are written with commas between them."""
     try:
-        return [float(word) for word in text.split(",")]
+        return [number(word) for word in text.split(",")]
     except ValueError as error:
         raise InputError(f"{option} is '{text}'; expected numbers with commas between them") from error
 

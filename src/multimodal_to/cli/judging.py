@@ -15,7 +15,7 @@ from rich.text import Text
 
 from multimodal_to.adam.inspection import describe
 from multimodal_to.auditing.audit import Audit, audit
-from multimodal_to.cli.common import File, RobotOption, app, described, loaded, out, writable
+from multimodal_to.cli.common import File, RobotOption, app, described, loaded, number_option, out, writable
 from multimodal_to.cli.completion import robots_or_urdfs
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import load_robot
@@ -94,7 +94,12 @@ def simulate(
         bool, typer.Option(help="Let a small stabiliser correct thrusts, contact forces and joints.")
     ] = True,
     delay: Annotated[
-        float, typer.Option(help="How far the motion follows the forces, from 0 to 1 intervals of the plan.")
+        float,
+        typer.Option(
+            parser=number_option,
+            metavar="FLOAT",
+            help="How far the motion follows the forces, from 0 to 1 intervals of the plan.",
+        ),
     ] = 0.0,
     torque_limits: Annotated[bool, typer.Option(help="Clip joint torques at the robot's effort limits.")] = True,
     robot: RobotOption = "",
@@ -122,9 +127,11 @@ def simulate(
         out.print(
             f"inverse dynamics {where}: MuJoCo and RNEA differ by {difference:.1e} of the largest force", soft_wrap=True
         )
+    joints = f"joints {outcome.joint:.1f}° ({outcome.joint_name}), " if outcome.joint_name else ""
+    slides = f"sliding joints {100 * outcome.slide:.1f} cm ({outcome.slide_name}), " if outcome.slide_name else ""
     out.print(
         f"largest errors over {plan.duration:.2f} s: CoM {100 * outcome.com:.1f} cm, base {outcome.attitude:.1f}°, "
-        f"joints {outcome.joint:.1f}° ({outcome.joint_name}), thrust {outcome.thrust:.1f} N",
+        f"{joints}{slides}thrust {outcome.thrust:.1f} N",
         soft_wrap=True,
     )
     beyond = "clipped" if outcome.clipped else "not clipped, beyond it"

@@ -9,7 +9,17 @@ from typing import Annotated
 
 import typer
 
-from multimodal_to.cli.common import File, RobotOption, app, loaded, option_numbers, out, writable, writable_file
+from multimodal_to.cli.common import (
+    File,
+    RobotOption,
+    app,
+    loaded,
+    number_option,
+    option_numbers,
+    out,
+    writable,
+    writable_file,
+)
 from multimodal_to.cli.completion import exports, figures
 from multimodal_to.errors import InputError, OutputError, unknown
 from multimodal_to.exporting.export import EXPORTS
@@ -73,7 +83,9 @@ def replay(
     mp4: Annotated[Path | None, typer.Option(help="Write an MP4 film.")] = None,
     snapshots: Annotated[Path | None, typer.Option(help="Write a PNG of the robot at several times.")] = None,
     times: Annotated[str, typer.Option(help="Times of the snapshots [s], as 0,2.5,7.")] = "",
-    fps: Annotated[float | None, typer.Option(help="Frames a second. [GIF 12.5, MP4 25]")] = None,
+    fps: Annotated[
+        float | None, typer.Option(parser=number_option, metavar="FLOAT", help="Frames a second. [GIF 12.5, MP4 25]")
+    ] = None,
     beside: Annotated[
         Path | None,
         typer.Option("--with", metavar="OTHER", help="Draw another trajectory of the robot with it, faint."),

@@ -24,8 +24,10 @@ from multimodal_to.cli.common import (
     chosen,
     described,
     loaded,
+    number_option,
     out,
     say,
+    whole_number_option,
     writable,
 )
 from multimodal_to.cli.expectation import expect
@@ -113,12 +115,12 @@ def _show_torques(file: Path, robot: str) -> None:
     """Print the largest torque of every joint, the nearest to its effort limit first."""
     if file.suffix != ".npz":
         raise InputError(f"--torques goes with a trajectory file; '{file}' is no .npz")
-    numbers = [Column(title, justify="right") for title in ("largest torque [N m]", "at [s]", "effort [N m]", "share")]
+    numbers = [Column(title, justify="right") for title in ("largest torque", "at [s]", "effort", "share")]
     table = Table("joint", *numbers, box=None, pad_edge=False)
     for one in largest_torques(*loaded(file, robot)):
         limited = math.isfinite(one.effort)
-        limit, share = (f"{one.effort:g}", f"{100 * one.over_effort:.0f} %") if limited else ("none", "")
-        table.add_row(one.joint, f"{one.torque:.1f}", f"{one.when:.2f}", limit, share)
+        limit, share = (f"{one.effort:g} {one.unit}", f"{100 * one.over_effort:.0f} %") if limited else ("none", "")
+        table.add_row(one.joint, f"{one.torque:.1f} {one.unit}", f"{one.when:.2f}", limit, share)
     out.print(table)
 
 
@@ -181,8 +183,12 @@ def solve(
             autocompletion=completion.robots_or_folders,
         ),
     ] = "",
-    max_iterations: Annotated[int, typer.Option(help="Most iterations.")] = 1000,
-    time_limit: Annotated[float, typer.Option(help="Most seconds in the solver.")] = 3600.0,
+    max_iterations: Annotated[
+        int, typer.Option(parser=whole_number_option, metavar="INTEGER", help="Most iterations.")
+    ] = 1000,
+    time_limit: Annotated[
+        float, typer.Option(parser=number_option, metavar="FLOAT", help="Most seconds in the solver.")
+    ] = 3600.0,
     linear_solver: Annotated[
         str,
         typer.Option(

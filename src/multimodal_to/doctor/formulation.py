@@ -14,7 +14,7 @@ from multimodal_to.errors import FormulationError, MultimodalError, listed
 from multimodal_to.ocp.outline import Outline, formulate
 from multimodal_to.ocp.stages import NamedStage
 from multimodal_to.ocp.variables import Bounds, Layout
-from multimodal_to.trajectory import QUANTITIES, labels
+from multimodal_to.trajectory import QUANTITIES, labels, row_units
 
 _INTEGRATION = "_integration"  # what the names of rows end with that tie a variable to its own rate and nothing else
 
@@ -48,7 +48,7 @@ def _crossed(task: Task, outline: Outline) -> Iterator[Symptom]:
         yield error(
             "bounds",
             f"{name} ({labels(name, task.robot)[row]}) has to be at least {least:.6g} and at most {greatest:.6g} "
-            f"{QUANTITIES[name].unit} at knot {knot}",
+            f"{row_units(QUANTITIES[name], task.robot)[row]} at knot {knot}",
             "lower mid_height_min or widen com_range" if middle and not terms else either,
         )
 

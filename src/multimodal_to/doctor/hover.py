@@ -14,6 +14,7 @@ from multimodal_to.doctor.balance import LONG_LEVER, Residual, residual
 from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
 from multimodal_to.doctor.search import search
 from multimodal_to.doctor.task import Task
+from multimodal_to.models.joint_units import joint_units
 from multimodal_to.models.robot import Posture
 from multimodal_to.ocp import paper
 from multimodal_to.ocp.knot import Knot
@@ -21,7 +22,6 @@ from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import Constraint, equal
 from multimodal_to.scenarios.scenario import Vector3
 
-_UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 _SLACK = 2e-2
 """Share of the weight that a base within its tolerance of upright, and what force contacts may keep, cannot make up."""
 _HOVER = (
@@ -55,17 +55,19 @@ def trim(task: Task) -> Iterator[Symptom]:
                 "clear of the ground there",
             )
         else:
-            turned = np.abs(found.joint_positions - posture.joint_positions)
+            moved = np.abs(found.joint_positions - posture.joint_positions)
+            most = int(moved.argmax())
+            amount = f"{moved[most]:.2f} {joint_units(task.robot, 'rad')[most]}"
             yield note(
                 "hover trim",
                 f"the posture as it stands cannot hover, thrusts leave {here} over; one with "
-                f"{task.robot.joint_names[int(turned.argmax())]} moved by {turned.max():.2f} rad can, at the {when}",
+                f"{task.robot.joint_names[most]} moved by {amount} can, at the {when}",
             )
 
 
 def upright(task: Task) -> Posture:
-    """Return the posture with the base upright, where a hover has to be within 2e-3 rad of it."""
-    return replace(task.posture, base_quaternion_xyzw=_UPRIGHT)
+    """Return the posture with the base upright, where a hover has to be within 2e-3 rad of it: `Robot.upright`."""
+    return replace(task.posture, base_quaternion_xyzw=task.robot.upright.base_quaternion_xyzw)
 
 
 def _impossible(task: Task, posture: Posture, here: Residual) -> str:

@@ -29,6 +29,12 @@ def reach(task: Task) -> Iterator[Symptom]:
             yield from _beyond(task, term, names, limits, key)
 
 
+def _upright(task: Task) -> bool:
+    """Return whether the posture that the problem is built around has the attitude of a hover."""
+    along = task.posture.base_quaternion_xyzw @ task.robot.upright.base_quaternion_xyzw
+    return bool(abs(abs(along) - 1.0) < _TOLERANCE)
+
+
 def _beyond(task: Task, term: Constraint, names: tuple[str, ...], limits: Array, key: str) -> Iterator[Symptom]:
     robot = task.robot
     knot = knot_of(task, task.posture, cs.SX.zeros(3 * len(robot.contacts)), cs.SX.zeros(len(robot.jets)))
@@ -38,7 +44,7 @@ def _beyond(task: Task, term: Constraint, names: tuple[str, ...], limits: Array,
         return
     point, axis = np.unravel_index(int(arms.argmax()), arms.shape)
     # A robot without moving joints that has to be upright somewhere can bring nothing nearer there.
-    certain = task.rigid and bool(task.hovers) and not np.any(task.posture.base_quaternion_xyzw[:3])
+    certain = task.rigid and bool(task.hovers) and _upright(task)
     yield (error if certain else warning)(
         "reach",
         f"{names[point]} is {arms[point, axis] * limits[axis]:.3g} m from the CoM along {'xyz'[axis]} in the posture "

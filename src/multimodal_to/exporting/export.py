@@ -12,9 +12,11 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import OutputError
-from multimodal_to.files.writing import whole
+from multimodal_to.exporting.consumers import WholeMotion, by_name, by_place, whole_motion
+from multimodal_to.files.writing import whole as whole_file
+from multimodal_to.models.joint_units import described
 from multimodal_to.models.robot import Robot
-from multimodal_to.trajectory import QUANTITIES, Trajectory, labels, row_labels
+from multimodal_to.trajectory import QUANTITIES, Quantity, Trajectory, labels, row_labels, row_units
 from multimodal_to.trajectory.derived import JOINT_TORQUES, base_poses, joint_torques, sampled
 
 _NAMES = ("joint_names", "contact_names", "jet_names")
@@ -43,11 +45,15 @@ def columns(robot: Robot, trajectory: Trajectory) -> dict[str, tuple[str, Array]
     torques, trajectory = joint_torques(robot, trajectory), sampled(trajectory)
     table = {"time": ("s", trajectory.time)}
     for name, quantity in QUANTITIES.items():
-        for row, label in enumerate(labels(name, trajectory, separator=".")):
+        rows = labels(name, trajectory, separator=".")
+        for label, unit, values in zip(
+            rows, row_units(quantity, robot, len(rows)), getattr(trajectory, name), strict=True
+        ):
             place = label.replace(" ", "_") if quantity.of == "jet" else label
-            table[".".join(filter(None, (name, place)))] = (quantity.unit, getattr(trajectory, name)[row])
-    for joint, values in zip(row_labels(trajectory, JOINT_TORQUES.of, JOINT_TORQUES.axes), torques, strict=True):
-        table[f"joint_torques.{joint}"] = (JOINT_TORQUES.unit, values)
+            table[".".join(filter(None, (name, place)))] = (unit, values)
+    names = row_labels(trajectory, JOINT_TORQUES.of, JOINT_TORQUES.axes)
+    for joint, unit, values in zip(names, row_units(JOINT_TORQUES, robot), torques, strict=True):
+        table[f"joint_torques.{joint}"] = (unit, values)
     return table
 
 
@@ -60,7 +66,7 @@ def write_csv(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
         path: of the file, by convention `.csv`.
     """
     table = columns(robot, trajectory)
-    with whole(path) as draft, draft.open("w", encoding="utf-8", newline="") as stream:
+    with whole_file(path) as draft, draft.open("w", encoding="utf-8", newline="") as stream:
         for line in (f"robot {trajectory.robot}, scenario {trajectory.scenario}", *CONVENTIONS):
             stream.write(f"# {line}\n")
         writer = csv.writer(stream, lineterminator="\n")
@@ -72,7 +78,7 @@ def write_csv(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
 def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
     """Write a MATLAB file (version 5): every quantity and the joint torques, (rows, knots + 1), names, units.
 
-    Names are cells; units are a struct.
+    Names are cells; units are a struct, with one text for a quantity or, where joints differ, a cell for each of them.
 
     Args:
         robot: the robot of the trajectory, for the torques.
@@ -91,83 +97,112 @@ def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
         "robot": trajectory.robot,
         "scenario": trajectory.scenario,
         "conventions": "\n".join(CONVENTIONS),
-        "units": {name: quantity.unit for name, quantity in {**QUANTITIES, "joint_torques": JOINT_TORQUES}.items()},
+        "units": {
+            name: _mat_units(quantity, robot)
+            for name, quantity in {**QUANTITIES, "joint_torques": JOINT_TORQUES}.items()
+        },
         "time": trajectory.time,
         **{name: np.array(getattr(trajectory, name), dtype=object) for name in _NAMES},
         **{name: getattr(trajectory, name) for name in QUANTITIES},
         "joint_torques": torques,
     }
-    with whole(path) as draft:
+    with whole_file(path) as draft:
         savemat(draft, content, oned_as="row", long_field_names=True)
     return Path(path)
+
+
+def _mat_units(quantity: Quantity, robot: Robot) -> str | Array:
+    """Return the unit of a quantity, or the cells of its rows' units where they are not all the same."""
+    units = row_units(quantity, robot)
+    return np.array(units, dtype=object) if len(set(units)) > 1 else next(iter(units), quantity.unit)
 
 
 def write_mujoco(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
     """Write an `.npz` with MuJoCo's qpos, qvel and ctrl for a free base, a row for each knot, and `conventions`.
 
     qpos = (p, quaternion w x y z, s); qvel = (ṗ in world axes, ω in the base's axes, ṡ); ctrl = (joint torques by
-    inverse dynamics [N m], thrusts [N]). Joints and jets are in the order of `joint_names` and `jet_names`.
+    inverse dynamics [N m or N], thrusts [N]). Joints are all that can move, in the order of MuJoCo's own model of the
+    URDF with a free joint at its root, which `joint_names` says; jets are in the order of `jet_names`.
 
     Args:
-        robot: the robot of the trajectory, for the torques.
+        robot: the robot of the trajectory.
         trajectory: the motion.
         path: of the file, by convention `.npz`.
+
+    Raises:
+        InputError: the trajectory is for another robot.
     """
-    torques, trajectory = joint_torques(robot, trajectory), sampled(trajectory)
+    whole, trajectory = whole_motion(robot, trajectory, by_place), sampled(trajectory)
     parts = {
-        "qpos": [trajectory.base_position, _unit_quaternions(trajectory)[[3, 0, 1, 2]], trajectory.joint_positions],
-        "qvel": [
-            trajectory.base_linear_velocity,
-            _in_base(trajectory, "base_angular_velocity"),
-            trajectory.joint_velocities,
-        ],
-        "ctrl": [torques, trajectory.thrust],
+        "qpos": [trajectory.base_position, _unit_quaternions(trajectory)[[3, 0, 1, 2]], whole.positions],
+        "qvel": [trajectory.base_linear_velocity, _in_base(trajectory, "base_angular_velocity"), whole.velocities],
+        "ctrl": [whole.torques, trajectory.thrust],
     }
-    return _write_arrays(
-        robot,
-        trajectory,
-        path,
-        parts,
-        (
-            "qpos = (base position [m], quaternion w x y z, joints [rad]).",
-            "qvel = (base's linear velocity in world axes [m/s], angular in its own axes [rad/s], joints [rad/s]).",
-            "ctrl = (joint torques [N m], thrusts [N]).",
-        ),
+    conventions = (
+        "Joints are all that can move, in the order of MuJoCo's model of the URDF with a free joint at its root; those "
+        "that the plan holds still are where it holds them.",
+        f"qpos = (base position [m], quaternion w x y z, joints [{_joint_units(whole, 'rad')}]).",
+        "qvel = (base's linear velocity in world axes [m/s], angular in its own axes [rad/s], joints "
+        f"[{_joint_units(whole, 'rad/s')}]).",
+        f"ctrl = (joint torques [{_joint_units(whole, 'N m')}], thrusts [N]).",
     )
+    return _write_arrays(robot, trajectory, path, parts, conventions, whole)
 
 
 def write_pinocchio(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
     """Write an `.npz` with Pinocchio's q, v and tau for a free flyer, a row for each knot, and `conventions`.
 
     q = (p, quaternion x y z w, s); v = (ṗ and ω, both in the base's axes, ṡ); tau = joint torques by inverse dynamics
-    [N m]. Joints are in the order of `joint_names`, which need not be that of a Pinocchio model.
+    [N m or N]. They are those of `pinocchio.buildModelFromUrdf(urdf, pinocchio.JointModelFreeFlyer())`: joints are all
+    that can move, in Pinocchio's order, which `joint_names` says, and a continuous joint has its cosine and sine in q.
 
     Args:
-        robot: the robot of the trajectory, for the torques.
+        robot: the robot of the trajectory.
         trajectory: the motion.
         path: of the file, by convention `.npz`.
+
+    Raises:
+        InputError: the trajectory is for another robot.
     """
-    torques, trajectory = joint_torques(robot, trajectory), sampled(trajectory)
+    whole, trajectory = whole_motion(robot, trajectory, by_name), sampled(trajectory)
+    rows = [
+        row
+        for joint, values in zip(whole.joints, whole.positions, strict=True)
+        for row in ((np.cos(values), np.sin(values)) if joint.kind == "continuous" else (values,))
+    ]
     parts = {
-        "q": [trajectory.base_position, _unit_quaternions(trajectory), trajectory.joint_positions],
+        "q": [
+            trajectory.base_position,
+            _unit_quaternions(trajectory),
+            np.array(rows).reshape(len(rows), trajectory.time.size),
+        ],
         "v": [
             _in_base(trajectory, "base_linear_velocity"),
             _in_base(trajectory, "base_angular_velocity"),
-            trajectory.joint_velocities,
+            whole.velocities,
         ],
-        "tau": [torques],
+        "tau": [whole.torques],
     }
-    return _write_arrays(
-        robot,
-        trajectory,
-        path,
-        parts,
-        (
-            "q = (base position [m], quaternion x y z w, joints [rad]).",
-            "v = (base's linear velocity [m/s] and angular velocity [rad/s], both in its own axes, joints [rad/s]).",
-            "tau = joint torques [N m].",
-        ),
+    conventions = (
+        "Joints are all that can move, in the order of Pinocchio's model of the URDF with a free flyer; those that the "
+        "plan holds still are where it holds them.",
+        "q = (base position [m], quaternion x y z w, joints, continuous ones as cosine and sine, "
+        f"[{_joint_units(whole, 'rad')}]).",
+        "v = (base's linear velocity [m/s] and angular velocity [rad/s], both in its own axes, joints "
+        f"[{_joint_units(whole, 'rad/s')}]).",
+        f"tau = joint torques [{_joint_units(whole, 'N m')}].",
     )
+    return _write_arrays(robot, trajectory, path, parts, conventions, whole)
+
+
+def _joint_units(whole: WholeMotion, unit: str) -> str:
+    """Return the unit of a value of all joints in words.
+
+    Args:
+        whole: with the joints.
+        unit: of a joint that turns.
+    """
+    return described({joint.name: joint.kind == "prismatic" for joint in whole.joints}, unit)
 
 
 def _write_arrays(
@@ -175,19 +210,31 @@ def _write_arrays(
     trajectory: Trajectory,
     path: str | os.PathLike[str],
     parts: Mapping[str, list[Array]],
-    order: tuple[str, ...],
+    conventions: tuple[str, ...],
+    whole: WholeMotion,
 ) -> Path:
+    """Write arrays with what they are.
+
+    Args:
+        robot: the robot of the trajectory.
+        trajectory: the motion at the knots.
+        path: of the file.
+        parts: the rows of each array.
+        conventions: what they are, in sentences.
+        whole: with the joints in their order.
+    """
     arrays = {name: np.vstack(rows).T for name, rows in parts.items()}
     rows = "One row for each knot; time in s; joints and jets in the order of joint_names and jet_names."
     texts = {
         "robot": trajectory.robot,
         "scenario": trajectory.scenario,
         "base": robot.kindyn.tree.base,
-        "conventions": "\n".join((rows, *order, _RATES)),
-        **{name: getattr(trajectory, name) for name in ("joint_names", "jet_names")},
+        "conventions": "\n".join((rows, *conventions, _RATES)),
+        "joint_names": whole.names,
+        "jet_names": trajectory.jet_names,
     }
     labels = {name: np.array(text, dtype=np.str_) for name, text in texts.items()}
-    with whole(path) as draft, draft.open("wb") as stream:
+    with whole_file(path) as draft, draft.open("wb") as stream:
         np.savez_compressed(stream, allow_pickle=False, time=trajectory.time, **arrays, **labels)
     return Path(path)
 

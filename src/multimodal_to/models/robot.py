@@ -20,7 +20,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
 from multimodal_to.files.reading import read_toml
 from multimodal_to.files.records import Records
-from multimodal_to.models import capsule_pairs, proportions
+from multimodal_to.models import attitude, capsule_pairs, proportions
 from multimodal_to.models.capsule import Capsule, CapsulePair, plume
 from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import Jet
@@ -35,11 +35,14 @@ NamePairs = frozenset[frozenset[str]]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Posture:
-    """A configuration of the robot: base in the world and joints."""
+    """A configuration of the robot: base in the world and joints; of ρ and −ρ it keeps the one of `attitude.signed`."""
 
     base_position: Array  # (3,) [m]
     base_quaternion_xyzw: Array  # (4,), unit, world-from-base
     joint_positions: Array  # (n,) [rad or m]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "base_quaternion_xyzw", attitude.signed(self.base_quaternion_xyzw))
 
     @property
     def base_transform(self) -> Array:
@@ -79,6 +82,8 @@ class Robot:
     link_capsules: tuple[Capsule, ...] = ()  # shapes of links; `capsules` has the plumes beside
     ignored_pairs: NamePairs = frozenset()  # of capsules that may come as near as they like
     held_pairs: NamePairs = frozenset()  # of capsules that a problem holds apart; empty: `near_capsule_pairs` chooses
+    lean_xyzw: Array = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
+    """Rotation from upright to home in the base's axes, (4,): ρ_home = ρ_upright ∘ lean."""
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -117,6 +122,18 @@ class Robot:
     def weight(self) -> float:
         """Return m |g| [N]."""
         return self.mass * float(np.linalg.norm(self.gravity))
+
+    @property
+    def up(self) -> Array:
+        """Return the unit vector against gravity in world axes, (3,); without gravity it is z."""
+        strength = float(np.linalg.norm(self.gravity))
+        return -self.gravity / strength if strength else np.array([0.0, 0.0, 1.0])
+
+    @property
+    def upright(self) -> Posture:
+        """Return home without its lean: the attitude of the base in a hover, with home's heading."""
+        turned = attitude.product(self.home.base_quaternion_xyzw, attitude.conjugate(self.lean_xyzw))
+        return replace(self.home, base_quaternion_xyzw=attitude.tidied(turned))
 
     @cached_property
     def standing_height(self) -> float:
@@ -259,6 +276,7 @@ def _robot(file: RobotFile, folder: Path) -> Robot:
         link_capsules=links,
         ignored_pairs=_named_pairs("ignore", file.collision.ignore, links, jets),
         held_pairs=_named_pairs("hold_apart", file.collision.hold_apart, links, jets),
+        lean_xyzw=_unit(file.home.lean_xyzw),
     )
 
 
@@ -300,12 +318,15 @@ def _effort(joint: JointTable, stated: float) -> float:
 
 
 def _home(file: RobotFile) -> Posture:
-    quaternion_xyzw = np.array(file.home.base_quaternion_xyzw)
     return Posture(
         base_position=np.array(file.home.base_position),
-        base_quaternion_xyzw=quaternion_xyzw / np.linalg.norm(quaternion_xyzw),
+        base_quaternion_xyzw=_unit(file.home.base_quaternion_xyzw),
         joint_positions=np.array([joint.home for joint in file.joints.values()]),
     )
+
+
+def _unit(quaternion_xyzw: Sequence[float]) -> Array:
+    return np.asarray(np.array(quaternion_xyzw) / np.linalg.norm(quaternion_xyzw))
 
 
 def _link_capsules(file: RobotFile) -> tuple[Capsule, ...]:

@@ -47,12 +47,17 @@ class HomeTable:
     base_position: Vector3
     """Origin of the base in the world at home [m]."""
     base_quaternion_xyzw: tuple[float, float, float, float]
-    """World-from-base rotation at home as a unit quaternion, x y z w [1]."""
+    """World-from-base rotation at home as a unit quaternion, x y z w [1]. It says where the robot heads, and what
+    upright is for its base."""
+    lean_xyzw: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+    """How the base leans at home: the rotation from upright to home in the base's axes, a unit quaternion x y z w [1].
+    A hover is upright. By default home is upright."""
 
     def __post_init__(self) -> None:
-        norm = float(np.linalg.norm(self.base_quaternion_xyzw))
-        if abs(norm - 1) > 1e-3:
-            raise InputError(f"base_quaternion_xyzw has the norm {norm:.4f}; expected 1")
+        for key in ("base_quaternion_xyzw", "lean_xyzw"):
+            norm = float(np.linalg.norm(getattr(self, key)))
+            if abs(norm - 1) > 1e-3:
+                raise InputError(f"{key} has the norm {norm:.4f}; expected 1")
 
 
 @dataclass(frozen=True, kw_only=True)

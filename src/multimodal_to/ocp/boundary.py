@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from multimodal_to.models.attitude import signed_like
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.variables import Bounds
@@ -13,9 +14,6 @@ from multimodal_to.trajectory import rules
 _AT_REST = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
 _NO_FORCE = 0.01
 """Largest contact force component left at a knot that has to be free of contact [N]."""
-_UPRIGHT = 1e-3
-"""How far the base's quaternion may be from upright at an end in the air [1]."""
-_ORIENTATION = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def set_boundary(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture, rule: str) -> None:
@@ -41,11 +39,10 @@ def _set_start(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Postu
     for name in (*_AT_REST, "com_velocity", "angular_momentum", "thrust_rate"):
         fix(name, 0, 0.0)
     if scenario.start is Start.HOVER:
-        fix("base_quaternion_xyzw", 0, _ORIENTATION, within=_UPRIGHT)
         fix("contact_forces", 0, 0.0, within=_NO_FORCE)
         return
     fix("base_position", 0, standing.base_position)
-    fix("base_quaternion_xyzw", 0, standing.base_quaternion_xyzw)
+    fix("base_quaternion_xyzw", 0, signed_like(standing.base_quaternion_xyzw, robot.upright.base_quaternion_xyzw))
     fix("joint_positions", 0, standing.joint_positions)
     fix("contact_positions", 0, contact_positions(robot, standing))
     fix("thrust", 0, 0.0)
@@ -70,4 +67,3 @@ def _set_end(bounds: Bounds, scenario: Scenario, rule: str) -> None:
         # Where velocities are between knots, the forces of the knot before the last one make the last velocity.
         for knot in (last - 1, last) if rules.instant(rule, "com_velocity") else (last,):
             fix("contact_forces", knot, 0.0, within=_NO_FORCE)
-        fix("base_quaternion_xyzw", last, _ORIENTATION, within=_UPRIGHT)

@@ -8,8 +8,9 @@ from __future__ import annotations
 import casadi as cs
 
 from multimodal_to.adam import centroidal as rigid_body
+from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import SX
-from multimodal_to.models import contact
+from multimodal_to.models import attitude, contact
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
@@ -111,6 +112,18 @@ def steady_thrust(knot: Knot, parameters: Parameters) -> SX:
 def unit_quaternion(knot: Knot, parameters: Parameters) -> SX:
     """|ρ|² − 1 = 0 where the orientation is found; later knots inherit it through their integration."""
     return cs.sumsqr(knot.base_quaternion_xyzw) - 1
+
+
+def off_upright(knot: Knot, parameters: Parameters) -> SX:
+    """ρ̄⁻¹ ∘ ρ less none: half the angles from the upright ρ̄ about two level axes and the vertical, and w − 1.
+
+    ρ̄ is `Robot.upright`, with home's heading. The axes are the base's own, turned so that the last is the vertical.
+    """
+    robot = parameters.robot
+    upright = robot.upright
+    turn = quaternion.product(quaternion.conjugate(cs.DM(upright.base_quaternion_xyzw)), knot.base_quaternion_xyzw)
+    axes = attitude.axes_about(upright.base_transform[:3, :3].T @ robot.up)
+    return cs.vertcat(cs.DM(axes) @ turn[:3], turn[3] - 1)
 
 
 # -------------------------------------------------------------------- over an interval

@@ -11,6 +11,7 @@ from multimodal_to.adam import centroidal, quaternion
 from multimodal_to.adam.kinematics import Pose, forward_kinematics
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import ScenarioError
+from multimodal_to.models.attitude import signed_like
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Surface, heights_below
 from multimodal_to.ocp.gait import steps
@@ -141,7 +142,8 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     view = layout.read(guess)
     view["com_position"][:] = start[:, None] + travelled
     view["base_position"][:] = standing.base_position[:, None] + travelled
-    view["base_quaternion_xyzw"][:] = standing.base_quaternion_xyzw[:, None]
+    upright = robot.upright.base_quaternion_xyzw
+    view["base_quaternion_xyzw"][:] = signed_like(standing.base_quaternion_xyzw, upright)[:, None]
     view["joint_positions"][:] = standing.joint_positions[:, None]
 
     flown = _weight_flown(robot, scenario)

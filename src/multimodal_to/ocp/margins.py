@@ -23,7 +23,7 @@ from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.self_collision import link_distances, link_pair_labels
-from multimodal_to.ocp.terms import Constraint, Where, at_least, between
+from multimodal_to.ocp.terms import Constraint, JointUnits, Where, at_least, between
 
 
 def generalised_forces(interval: Interval) -> SX:
@@ -150,7 +150,7 @@ LINK_DISTANCES = Constraint(
 CONSTRAINTS = (CENTRE_OF_PRESSURE, TOUCH_DOWN, JOINT_TORQUES, LINK_DISTANCES)
 COSTS = (
     paper.running(costs.throttle_rate, "%/s", Where.EVERY_INTERVAL, scale=50.0),
-    paper.running(costs.joint_accelerations, "rad/s²", Where.EVERY_INTERVAL, scale=10.0),
+    paper.running(costs.joint_accelerations, JointUnits("rad/s²"), Where.EVERY_INTERVAL, scale=10.0),
     paper.running(costs.foot_tilt, "1", scale=0.1),
     paper.running(costs.skimming, "1", Where.EVERY_INTERVAL, scale=0.1),
 )

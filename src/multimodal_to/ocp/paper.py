@@ -18,8 +18,10 @@ from multimodal_to.ocp.terms import (
     Constraint,
     Cost,
     IntervalFunction,
+    JointUnits,
     KnotFunction,
     Labels,
+    Units,
     Where,
     at_least,
     at_most,
@@ -31,6 +33,9 @@ from multimodal_to.trajectory.quantities import TWIST, XYZ, XYZW, row_labels
 
 ON_GROUND = 1e-5
 """Largest height of a contact point that stands [m]: a sole has more corners than a plane needs."""
+
+UPRIGHT = 1e-3
+"""How far each part of the base's quaternion, from upright, may be off in a hover [1]: 2e-3 rad about each axis."""
 
 FORCE = 50.0
 """Size of a force that the solver takes for one [N]."""
@@ -58,6 +63,16 @@ def _stands_last(parameters: Parameters) -> bool:
 UNIT_QUATERNION = Constraint(
     value=constraints.unit_quaternion, within=equal(), unit="1", holds=Where.FIRST_KNOT, when=_hovers_first
 )
+UPRIGHT_FIRST = Constraint(
+    name="upright_first",
+    value=constraints.off_upright,
+    within=between(-UPRIGHT, UPRIGHT),
+    unit="1",
+    holds=Where.FIRST_KNOT,
+    labels=("level 1", "level 2", "vertical", "w"),
+    when=_hovers_first,
+)
+UPRIGHT_LAST = replace(UPRIGHT_FIRST, name="upright_last", holds=Where.LAST_KNOT, when=_hovers_last)
 COM_KINEMATICS = Constraint(value=constraints.com_kinematics, within=equal(), unit="m", labels=XYZ)
 ANGULAR_MOMENTUM_KINEMATICS = Constraint(
     value=constraints.angular_momentum_kinematics,
@@ -146,7 +161,7 @@ BASE_ORIENTATION_INTEGRATION = Constraint(
 JOINT_INTEGRATION = Constraint(
     value=constraints.joint_integration,
     within=equal(),
-    unit="rad",
+    unit=JointUnits("rad"),
     holds=Where.EVERY_INTERVAL,
     labels=_each("joint"),
 )
@@ -222,6 +237,8 @@ LEAPFROG = (COMPLEMENTARITY_BEFORE, COMPLEMENTARITY_AFTER, SLIDING_AFTER, FINAL_
 
 CONSTRAINTS = (
     UNIT_QUATERNION,
+    UPRIGHT_FIRST,
+    UPRIGHT_LAST,
     COM_KINEMATICS,
     ANGULAR_MOMENTUM_KINEMATICS,
     CONTACT_KINEMATICS,
@@ -263,7 +280,7 @@ def weight_of(name: str) -> Callable[[Parameters], float | Array]:
 
 def running(
     residual: KnotFunction | IntervalFunction,
-    unit: str | tuple[str, ...],
+    unit: Units,
     *charged: Where,
     scale: float = 1.0,
 ) -> Cost:
@@ -280,7 +297,7 @@ def running(
     return Cost(residual=residual, weight=weight_of(name), unit=unit, charged=places, scale=scale)
 
 
-def _once(name: str, residual: KnotFunction | IntervalFunction, unit: str, where: Where = Where.LAST_KNOT) -> Cost:
+def _once(name: str, residual: KnotFunction | IntervalFunction, unit: Units, where: Where = Where.LAST_KNOT) -> Cost:
     """Return a cost that is charged once."""
     return Cost(name=name, residual=residual, weight=weight_of(name), unit=unit, charged=where, per_second=False)
 
@@ -293,16 +310,16 @@ COSTS = (
     running(costs.angular_momentum, "kg m²/s"),
     running(costs.angular_momentum_rate, "N m", Where.EVERY_INTERVAL),
     running(costs.base_acceleration, _TWIST_RATE, Where.EVERY_INTERVAL),
-    running(costs.joint_velocities, "rad/s"),
-    running(costs.posture, "rad"),
+    running(costs.joint_velocities, JointUnits("rad/s")),
+    running(costs.posture, JointUnits("rad")),
     running(costs.base_orientation, "1"),
     running(costs.contact_forces, "N", Where.FIRST_KNOT, Where.LATER_KNOTS, scale=50.0),
     running(costs.contact_force_rates, "N/s", Where.EVERY_INTERVAL, scale=50.0),
     running(costs.thrust, "N", scale=100.0),
     running(costs.thrust_rate, "N/s", scale=50.0),
     running(costs.throttle, "%", scale=50.0),
-    _once("initial_posture", costs.posture, "rad", Where.FIRST_KNOT),
-    _once("final_posture", costs.posture, "rad"),
+    _once("initial_posture", costs.posture, JointUnits("rad"), Where.FIRST_KNOT),
+    _once("final_posture", costs.posture, JointUnits("rad")),
     _once("final_com_velocity", costs.com_velocity, "m/s"),
     _once("final_com_acceleration", costs.com_acceleration, "m/s²", Where.LAST_INTERVAL),
     _once("final_angular_momentum", costs.angular_momentum, "kg m²/s"),

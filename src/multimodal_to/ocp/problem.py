@@ -14,7 +14,7 @@ from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.transcription import Nlp
 from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.scenario import Scenario
-from multimodal_to.trajectory import QUANTITIES, Trajectory
+from multimodal_to.trajectory import QUANTITIES, Trajectory, row_units
 from multimodal_to.trajectory.resampling import regrid
 from multimodal_to.trajectory.sameness import refuse_other_robot
 
@@ -86,6 +86,9 @@ class Problem:
         knots = self.scenario.knots
         motion = regrid(trajectory, knots, self.formulation.rule.name)
         values = np.vstack([getattr(motion, name) for name in self.layout.rows])
+        rho = self.layout.rows["base_quaternion_xyzw"]
+        if values[rho, 0] @ (self.guess * self.scale)[rho] < 0.0:  # −ρ is the same attitude; the problem has one
+            values[rho] *= -1.0
         x = np.append(values.ravel(order="F"), trajectory.duration / knots) / self.scale
         return np.clip(x, self.lower, self.upper)
 
@@ -122,12 +125,36 @@ class Problem:
             report[name] += float(value)
         return report
 
+    def unit_at(self, name: str, x: Array, g: Array | None = None) -> str:
+        """Return the unit of a violation that `largest_violations` names: that of its worst row.
+
+        Args:
+            name: of a set of rows, or of the bounds of a variable.
+            x: all variables, in solver units.
+            g: the rows at x where they are known already.
+        """
+        if rows := self.rows.get(name):
+            values = self.rows_at(x) if g is None else g
+            amounts = missed(values[rows.index], self.row_lower[rows.index], self.row_upper[rows.index]) * rows.scale
+            return str(rows.units[int(amounts.argmax())])
+        if bounds := self.bound_rows.get(name):
+            return str(bounds.units[int((bounds.missed_at(x) * bounds.scale).argmax())])
+        variable = name.removeprefix("bounds of ")
+        if not (units := self.variable_units(variable)):
+            return self.unit(name)
+        outside = missed(x, self.box_lower, self.box_upper) * self.scale
+        return units[int(self.layout.read_horizon(outside)[variable].max(axis=1).argmax())]
+
+    def variable_units(self, variable: str) -> tuple[str, ...]:
+        """Return the unit of each row of a variable at a knot; none for the interval."""
+        return row_units(QUANTITIES[variable], self.robot) if variable in QUANTITIES else ()
+
     def unit(self, name: str) -> str:
-        """Return the unit of a violation that `largest_violations` names."""
+        """Return the unit of a violation that `largest_violations` names, or all of its rows' units."""
         if rows := self.rows.get(name) or self.bound_rows.get(name):
             return ", ".join(dict.fromkeys(rows.units.tolist()))
         variable = name.removeprefix("bounds of ")
-        return QUANTITIES[variable].unit if variable in QUANTITIES else "s"
+        return ", ".join(dict.fromkeys(self.variable_units(variable))) or "s"
 
 
 def missed(values: Array, lower: Array, upper: Array) -> Array:

@@ -18,6 +18,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import SX, Array
 from multimodal_to.errors import FormulationError, MultimodalError, listed, shown
+from multimodal_to.models.joint_units import either, joint_units
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
@@ -28,6 +29,25 @@ Limit = float | Callable[[Parameters], float]
 """A number, or a function of the parameters for one that the robot or the scenario says."""
 Labels = tuple[str, ...] | Callable[[Parameters], tuple[str, ...]]
 """The names of a term's rows, or a function of the parameters where the robot says how many there are."""
+
+
+Units = str | tuple[str, ...] | Callable[[Parameters], tuple[str, ...]]
+"""The unit of a term's rows, of each of them, or a function of the parameters where the robot says which they have."""
+
+
+@dataclass(frozen=True)
+class JointUnits:
+    """The units of rows that are joints: of a joint that turns the one given, of one that slides its counterpart."""
+
+    turning: str  # one of `joint_units.SLIDING`
+
+    def __call__(self, parameters: Parameters) -> tuple[str, ...]:
+        """Return the unit of each joint."""
+        return joint_units(parameters.robot, self.turning)
+
+    def __str__(self) -> str:
+        """Return both units in words."""
+        return either(self.turning)
 
 
 class Where(Enum):
@@ -99,7 +119,7 @@ class Constraint:
     Args:
         value: what has to lie in the set: a function of a knot, or of an interval where `holds` says so.
         within: the set: `equal()`, `at_least(...)`, `at_most(...)` or `between(...)`.
-        unit: of the rows, such as `"m"`, `"N m"` or `"1"`; a tuple gives each row its own.
+        unit: of the rows, such as `"m"`, `"N m"` or `"1"`; a tuple or a function of the parameters gives each its own.
         name: in every report; by default the function's.
         holds: one place, or several.
         scale: the size that the solver takes for one [unit].
@@ -113,7 +133,7 @@ class Constraint:
 
     value: KnotFunction | IntervalFunction
     within: Within
-    unit: str | tuple[str, ...]
+    unit: Units
     name: str = ""
     holds: Where | tuple[Where, ...] = Where.EVERY_KNOT
     scale: float = 1.0
@@ -154,7 +174,8 @@ class Constraint:
         labels = _asked(self.name, "list of labels", self.labels, parameters) if callable(self.labels) else self.labels
         if not labels:
             labels = tuple(str(index) for index in range(1, count + 1)) if count > 1 else ("",) * count
-        units = (self.unit,) * count if isinstance(self.unit, str) else self.unit
+        units = _asked(self.name, "list of units", self.unit, parameters) if callable(self.unit) else self.unit
+        units = (units,) * count if isinstance(units, str) else units
         for kind, given in (("labels", labels), ("units", units)):
             if len(given) != count:
                 raise _wrong(self.name, f"there are {len(given)} {kind} for {count} rows", "one for each row")
@@ -171,7 +192,7 @@ class Cost:
         residual: what should be small: a function of a knot, or of an interval where `charged` says so.
         weight: a number of at least zero, or a function of the parameters that returns one number, or one for each row;
             a weight of zero leaves the cost out.
-        unit: of the residual, such as `"rad/s"`; a tuple gives each row its own.
+        unit: of the residual, such as `"rad/s"`; a tuple or a function of the parameters gives each row its own.
         name: in every report; by default the function's.
         charged: one place, or several.
         per_second: whether each charge is multiplied by Δt, so that the sum is an integral over time.
@@ -184,7 +205,7 @@ class Cost:
 
     residual: KnotFunction | IntervalFunction
     weight: float | Callable[[Parameters], float | Array]
-    unit: str | tuple[str, ...]
+    unit: Units
     name: str = ""
     charged: Where | tuple[Where, ...] = Where.LATER_KNOTS
     per_second: bool = True
@@ -263,7 +284,8 @@ def _complete(term: Constraint | Cost, function: Any, place: str) -> None:
         raise _wrong(name, f"'{place}' names knots and intervals", "only knots, or only intervals")
     if not (isinstance(term.scale, int | float) and 0 < term.scale < math.inf):
         raise _wrong(name, f"the scale is {shown(term.scale)}", "a positive number")
-    for unit in (term.unit,) if isinstance(term.unit, str) else term.unit:
+    given = () if callable(term.unit) else (term.unit,) if isinstance(term.unit, str) else term.unit
+    for unit in given:
         if not isinstance(unit, str) or not _UNIT.fullmatch(unit):
             raise _wrong(name, f"the unit is {shown(unit)}", f"one made of {listed(_SYMBOLS)}, as 'm/s²' or 'N m'")
 

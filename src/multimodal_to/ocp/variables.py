@@ -11,6 +11,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import FormulationError, ScenarioError, unknown
+from multimodal_to.models.joint_units import either
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import QUANTITIES
@@ -118,9 +119,11 @@ class Bounds:
         target = np.broadcast_to(np.asarray(value, dtype=float), self.lower[name][:, knot].shape)
         low, high = self.lower[name][:, knot], self.upper[name][:, knot]
         if bad := np.flatnonzero((target < low - 1e-9) | (target > high + 1e-9)).tolist():
+            quantity = QUANTITIES[name]
+            unit = either(quantity.unit) if quantity.of == "joint" else quantity.unit
             raise ScenarioError(
                 f"{name}[{bad[0]}] has to be {target[bad[0]]:.6g} at knot {knot}, outside its range "
-                f"{low[bad[0]]:.6g} to {high[bad[0]]:.6g} {QUANTITIES[name].unit}"
+                f"{low[bad[0]]:.6g} to {high[bad[0]]:.6g} {unit}"
             )
         self.lower[name][:, knot] = np.clip(target - within, low, high)
         self.upper[name][:, knot] = np.clip(target + within, low, high)
@@ -128,6 +131,8 @@ class Bounds:
 
 def ranges(robot: Robot, scenario: Scenario, layout: Layout) -> Bounds:
     """Return the box constraints that hold at every knot: limits of the robot, and of the scenario (eq. 28, 29).
+
+    A quaternion has no box: its norm is what its integration keeps, and at ±1 some headings would start on a bound.
 
     Args:
         robot: whose limits hold.
@@ -139,7 +144,6 @@ def ranges(robot: Robot, scenario: Scenario, layout: Layout) -> Bounds:
     reach = np.array(scenario.com_range)
     box: dict[str, tuple[Any, Any]] = {
         "com_position": (-reach, reach),
-        "base_quaternion_xyzw": (-1.0, 1.0),
         "base_linear_velocity": (-speed, speed),
         "base_angular_velocity": (-speed, speed),
         "joint_positions": (limits.lower, limits.upper),

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.models.joint_units import joint_units, slides
 from multimodal_to.models.robot import Robot
 from multimodal_to.plotting.style import (
     SMALL,
@@ -29,7 +30,7 @@ _CELL = (2.15, 1.55)  # [inch]
 
 
 def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
-    """Plot every joint's position [rad] over its whole range, which dashed lines end, and the speeds [rad/s] by group.
+    """Plot every joint's position [rad or m] over its whole range, which dashed lines end, and the speeds by group.
 
     The limit of the speeds is dashed where it is near enough to be seen; the title of each panel says it.
 
@@ -46,7 +47,8 @@ def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
         runs,
         [run.trajectory.joint_positions for run in runs],
         "joint_positions",
-        "position [rad]",
+        "position",
+        "rad",
         limits.lower,
         limits.upper,
         whole_range=True,
@@ -56,7 +58,7 @@ def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
 
 
 def plot_torques(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
-    """Plot every joint's torque [N m] (`derived.joint_torques`) and, dashed, its effort limit.
+    """Plot every joint's torque [N m], or force [N], and, dashed, its effort limit (`derived.joint_torques`).
 
     The knot whose acceleration the trajectory does not tell, the first or the last, is left out.
 
@@ -68,7 +70,7 @@ def plot_torques(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] 
     figure = new_figure(runs, "joint torques", (_COLUMNS * _CELL[0], (rows + 0.2) * _CELL[1]))
     effort = robot.joint_limits.effort
     values = [blank(joint_torques(run.robot, run.trajectory), run.trajectory) for run in runs]
-    _cells(figure, runs, values, "joint_positions", "torque [N m]", -effort, effort, whole_range=False)
+    _cells(figure, runs, values, "joint_positions", _effort_title(robot), "N m", -effort, effort, whole_range=False)
     return figure
 
 
@@ -77,6 +79,7 @@ def _cells(
     runs: Sequence[Run],
     values: Sequence[Array],
     of: str,
+    title: str,
     unit: str,
     lower: Array,
     upper: Array,
@@ -90,12 +93,13 @@ def _cells(
         runs: to draw.
         values: of each run, (n, knots + 1), a row for each joint.
         of: name of the quantity whose instants the columns have.
-        unit: title and unit of the values.
+        title: of the values.
+        unit: of the values of a joint that turns.
         lower: limit of each joint, in the unit of the values, (n,).
         upper: limit of each joint, in the unit of the values, (n,).
         whole_range: show the limits even where the motion stays far from them.
     """
-    names = runs[0].robot.joint_names
+    names, units = runs[0].robot.joint_names, joint_units(runs[0].robot, unit)
     rows = -(-len(names) // _COLUMNS)
     grid = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False)
     for index, axes in enumerate(grid.ravel()):
@@ -107,19 +111,43 @@ def _cells(
         largest = max(float(np.nanmax(np.abs(rows_of_run[index]))) for rows_of_run in values)
         if whole_range or (ends and largest > 0.3 * ends[-1]):
             draw_limits(axes, ends, None)
-        axes.set_title(_cell_title(names[index], ends, whole_range), fontsize=SMALL)
+        axes.set_title(_cell_title(names[index], ends, whole_range, _other_unit(units, index)), fontsize=SMALL)
         draw_flight([axes], runs)
         finish([axes], 0.0 if whole_range else 1.0)
         _tick(axes, bottom=index + _COLUMNS >= len(names))
-    figure.supylabel(unit, fontsize="medium")
+    figure.supylabel(f"{title} [{_several(units)}]", fontsize="medium")
 
 
-def _cell_title(name: str, ends: Sequence[float], whole_range: bool) -> str:
-    return name if whole_range or not ends else f"{name} (±{ends[-1]:g})"
+def _cell_title(name: str, ends: Sequence[float], whole_range: bool, unit: str) -> str:
+    """Return the title of a joint's panel.
+
+    Args:
+        name: of the joint.
+        ends: its limits.
+        whole_range: they are drawn.
+        unit: of its values where the joints have several, else empty.
+    """
+    limit = "" if whole_range or not ends else f"±{ends[-1]:g}"
+    said = " ".join(filter(None, (limit, unit)))
+    return f"{name} ({said})" if said else name
+
+
+def _effort_title(robot: Robot) -> str:
+    return " or ".join(dict.fromkeys("force" if sliding else "torque" for sliding in slides(robot))) or "torque"
+
+
+def _several(units: Sequence[str]) -> str:
+    """Return the units in words, each once."""
+    return " or ".join(dict.fromkeys(units))
+
+
+def _other_unit(units: Sequence[str], index: int) -> str:
+    """Return a joint's unit where the joints have several, else nothing."""
+    return units[index] if len(set(units)) > 1 else ""
 
 
 def _speeds(figure: SubFigure, robot: Robot, runs: Sequence[Run]) -> None:
-    groups = _disjoint_groups(robot)
+    groups, units = _disjoint_groups(robot), joint_units(robot, "rad/s")
     panels = figure.subplots(1, len(groups), sharex=True, squeeze=False)[0]
     for axes, (name, members) in zip(panels, groups.items(), strict=True):
         rows = [robot.joint_names.index(member) for member in members]
@@ -128,7 +156,8 @@ def _speeds(figure: SubFigure, robot: Robot, runs: Sequence[Run]) -> None:
         largest = max(float(np.abs(run.trajectory.joint_velocities[rows]).max()) for run in runs)
         if largest > 0.3 * limit:
             draw_limits(axes, (-limit, limit), None)
-        axes.set_title(f"{name.replace('_', ' ')} (±{limit:g})", fontsize=SMALL)
+        said = " ".join(filter(None, (f"±{limit:g}", _other_unit(units, rows[0]))))
+        axes.set_title(f"{name.replace('_', ' ')} ({said})", fontsize=SMALL)
         draw_flight([axes], runs)
         finish([axes], 0.1)
         _tick(axes, bottom=True)
@@ -142,11 +171,14 @@ def _speeds(figure: SubFigure, robot: Robot, runs: Sequence[Run]) -> None:
             columnspacing=0.8,
             borderpad=0.0,
         )
-    figure.supylabel("speed [rad/s]", fontsize="medium")
+    figure.supylabel(f"speed [{_several(units)}]", fontsize="medium")
 
 
 def _disjoint_groups(robot: Robot) -> dict[str, tuple[str, ...]]:
-    """Return the robot's first joint groups that have no joint in common, and the joints of none."""
+    """Return the robot's first joint groups that have no joint in common, and the joints of none.
+
+    Those of a group that slide are one of their own, since their speeds have another unit.
+    """
     chosen: dict[str, tuple[str, ...]] = {}
     taken: set[str] = set()
     for name, members in robot.joint_groups.items():
@@ -155,7 +187,14 @@ def _disjoint_groups(robot: Robot) -> dict[str, tuple[str, ...]]:
             taken.update(members)
     if rest := tuple(name for name in robot.joint_names if name not in taken):
         chosen["other joints" if chosen else "all joints"] = rest
-    return chosen
+    sliding = {name for name, slider in zip(robot.joint_names, slides(robot), strict=True) if slider}
+    parts = {}
+    for name, members in chosen.items():
+        turning = tuple(member for member in members if member not in sliding)
+        parts[name] = turning or members
+        if turning and len(turning) < len(members):
+            parts[f"{name}, sliding"] = tuple(member for member in members if member in sliding)
+    return parts
 
 
 def _tick(axes: Any, *, bottom: bool) -> None:

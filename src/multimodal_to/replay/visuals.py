@@ -53,7 +53,7 @@ def appearance(urdf: Path, *, meshes: bool = True) -> Appearance:
     robot = parse_urdf(urdf)
     dress = read_dress(urdf.parent) if meshes else None
     problems: dict[str, str] = {}
-    palette = {material.name: material for material in robot.materials}
+    palette = _palette(robot)
     found = []
     for link in robot.links:
         for index, visual in enumerate(link.visuals):
@@ -104,6 +104,21 @@ def _shapes(
     ]
 
 
+def _palette(robot: Any) -> dict[str, Any]:
+    """Return the materials of a URDF that have a colour, by name: the robot's own, then those defined in a visual.
+
+    Where visuals define one name differently, that of the link whose name comes first holds, whatever their order.
+    """
+    inner = [
+        visual.material
+        for link in sorted(robot.links, key=lambda link: str(link.name))
+        for visual in link.visuals
+        if visual.material is not None
+    ]
+    materials = [entry for entry in (*robot.materials, *inner) if entry.color is not None and entry.name]
+    return {entry.name: entry for entry in reversed(materials)}
+
+
 def _stated_colour(visual: Any, palette: Mapping[str, Any]) -> tuple[float, ...] | None:
     """Return the colour that a URDF gives a visual: its own, or the robot's of that name."""
     material = visual.material
@@ -124,7 +139,7 @@ def _dressed(dress: Dress, robot: Any, problems: dict[str, str]) -> list[Visual]
         problems: takes why a mesh cannot be drawn, by its address.
     """
     other = parse_urdf(dress.urdf)
-    links, palette = {link.name: link for link in other.links}, {entry.name: entry for entry in other.materials}
+    links, palette = {link.name: link for link in other.links}, _palette(other)
     found = []
     for garment, placement in zip(dress.garments, dress.placements(robot, other), strict=True):
         for index, visual in enumerate(links[garment.source].visuals):

@@ -92,7 +92,7 @@ def _facts(robot: Robot, trajectory: Trajectory, report: Audit) -> dict[str, str
         "robot": f"{robot.name}: {len(robot.joint_names)} joints, {robot.mass:.2f} kg, "
         f"{len(robot.contacts)} contact points, {len(robot.jets)} jets",
         "time": f"{report.duration:.2f} s in {trajectory.knots} intervals; longest flight {report.airborne:.2f} s",
-        "largest joint torque": f"{torque.torque:.1f} N m of {torque.joint} at {torque.when:.2f} s{share}",
+        "largest joint torque": f"{torque.torque:.1f} {torque.unit} of {torque.joint} at {torque.when:.2f} s{share}",
         "thrust at the end": f"{100 * report.final_thrust_over_weight:.2f} % of the weight, vertically",
         "solver": ", ".join(filter(None, (status, took))) or "not known",
         "report made with": ", ".join([*versions, f"Python {platform.python_version()}"]),

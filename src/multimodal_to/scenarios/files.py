@@ -14,6 +14,7 @@ from typing import Any
 import tomli_w
 
 from multimodal_to.errors import MultimodalError, ScenarioError, shortened, shown
+from multimodal_to.files.numbers import number
 from multimodal_to.files.reading import parse_toml, read_toml
 from multimodal_to.files.writing import write_text
 from multimodal_to.scenarios.bundled import find
@@ -89,6 +90,6 @@ def _value(text: str) -> Any:
     except ValueError:
         pass
     try:
-        return float(text)  # as a person writes it, .5 or 1.
+        return number(text)  # as a person writes it, .5 or 1.
     except ValueError:
         return text

@@ -59,9 +59,9 @@ class Weights:
     base_acceleration: float = 0.0
     """Weight of v̇, of the base's twist [1/(m/s²)², 1/(rad/s²)²]."""
     joint_velocities: Mapping[str, float] = field(default_factory=dict)
-    """Weights of ṡ by joint group of the robot [1/(rad/s)²]."""
+    """Weights of ṡ by joint group of the robot [1/(rad/s)² or 1/(m/s)²]."""
     posture: float = 0.0
-    """Weight of s − s̄, away from the standing posture [1/rad²]."""
+    """Weight of s − s̄, away from the standing posture [1/rad² or 1/m²]."""
     base_orientation: float = 0.0
     """Weight of the base away from home, as a quaternion's vector part [1]."""
     contact_forces: float = 0.0
@@ -77,15 +77,15 @@ class Weights:
     throttle_rate: float = 0.0
     """Weight of u̇ [1/(%/s)²]."""
     joint_accelerations: float = 0.0
-    """Weight of s̈ [1/(rad/s²)²]."""
+    """Weight of s̈ [1/(rad/s²)² or 1/(m/s²)²]."""
     foot_tilt: float = 0.0
     """Weight of soles that are not level with the ground: heights of their points, over the standing height L [1]."""
     skimming: float = 0.0
     """Weight of contact points that move along the ground close to it, over √(g L) [1]."""
     initial_posture: float = 0.0
-    """Weight of s − s̄ at the first knot, where it is found [1/rad²]."""
+    """Weight of s − s̄ at the first knot, where it is found [1/rad² or 1/m²]."""
     final_posture: float = 0.0
-    """Weight of s − the standing posture, at the last knot [1/rad²]."""
+    """Weight of s − the standing posture, at the last knot [1/rad² or 1/m²]."""
     final_com_velocity: float = 0.0
     """Weight of ẋ at the last knot [1/(m/s)²]."""
     final_com_acceleration: float = 0.0

@@ -262,7 +262,7 @@ def _throttle(jet: Jet, thrust: float, rate: float, acceleration: float) -> floa
 
 
 def _inertia(robot: Robot) -> Array:
-    """Return the robot's inertia about its CoM at home [kg m²], (3, 3)."""
+    """Return the robot's inertia about its CoM at home, in the axes of its base [kg m²], (3, 3)."""
     pose, joints = np.eye(4), robot.home.joint_positions
     mass = np.array(robot.kindyn.mass_matrix(pose, joints))
     x, y, z = np.array(robot.kindyn.CoM_position(pose, joints)).ravel()

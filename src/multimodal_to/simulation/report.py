@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.models.joint_units import slides
+from multimodal_to.models.robot import Robot
 from multimodal_to.simulation.model import TIME_STEP
 from multimodal_to.simulation.playback import Playback
 from multimodal_to.simulation.stabiliser import rotation_vector
@@ -44,8 +46,10 @@ class Tracking:
 
     com: float  # [m]
     attitude: float  # of the base [°]
-    joint: float  # [°]
-    joint_name: str
+    joint: float  # of those that turn [°]
+    joint_name: str  # empty where none turns
+    slide: float  # of the joints that slide [m]
+    slide_name: str  # empty where none slides
     thrust: float  # [N]
     switches: tuple[Switch, ...]
     torques: tuple[JointTorque, ...]  # of the joints that have an effort limit, the largest over its limit first
@@ -77,13 +81,17 @@ def tracking(playback: Playback) -> Tracking:
             for wanted, turn in zip(reference.rotation, _rotations(playback.qpos), strict=True)
         ]
     )
-    joints = np.degrees(np.abs(playback.qpos[:, 7:] - reference.joints))[during].max(axis=0)
+    joints = np.abs(playback.qpos[:, 7:] - reference.joints)[during].max(axis=0)
+    turn, turning = _worst_joint(robot, joints, sliding=False)
+    slide, sliding = _worst_joint(robot, joints, sliding=True)
     thrust = np.abs(playback.thrust - reference.thrust)[during]
     return Tracking(
         com=float(com[during].max()),
         attitude=float(attitude[during].max()),
-        joint=float(joints.max()),
-        joint_name=robot.joint_names[int(joints.argmax())],
+        joint=float(np.degrees(turn)),
+        joint_name=turning,
+        slide=slide,
+        slide_name=sliding,
         thrust=float(thrust.max(initial=0.0)),
         switches=_switches(playback),
         torques=_joint_torques(playback),
@@ -93,6 +101,21 @@ def tracking(playback: Playback) -> Tracking:
         com_at_end=float(com[-1]),
         attitude_at_end=float(attitude[-1]),
     )
+
+
+def _worst_joint(robot: Robot, errors: Array, *, sliding: bool) -> tuple[float, str]:
+    """Return the largest error of the joints that slide, or of those that turn [m or rad], and whose it is.
+
+    Args:
+        robot: whose joints.
+        errors: of each, (n,).
+        sliding: which of the two.
+    """
+    of_kind = [index for index, slider in enumerate(slides(robot)) if slider == sliding]
+    if not of_kind:
+        return 0.0, ""
+    worst = max(of_kind, key=lambda index: float(errors[index]))
+    return float(errors[worst]), robot.joint_names[worst]
 
 
 def _joint_torques(playback: Playback) -> tuple[JointTorque, ...]:

@@ -1,8 +1,8 @@
 """A small stabiliser: what thrusts, loaded contact points and joints add to the plan to bring its momentum back.
 
-Wanted is a change of the momentum's rate, with starred the plan and I the robot's inertia about its CoM:
+Wanted is a change of the momentum's rate, with starred the plan and I the robot's inertia about its CoM, in base axes:
 
-    Δl̇ = m (K_x (x* − x) + D_x (ẋ* − ẋ)),   Δḣω = I K_R Log(R* Rᵀ) + D_h (hω* − hω).
+    Δl̇ = m (K_x (x* − x) + D_x (ẋ* − ẋ)),   Δḣω = R* I R*ᵀ K_R Log(R* Rᵀ) + D_h (hω* − hω).
 
 Each of three stages takes what the one before leaves, by least squares: z minimises ‖W (A z − Δ)‖² + ‖z / σ‖².
 
@@ -91,7 +91,7 @@ def correct(
         plan: on the grid of the simulation.
         step: row of the plan.
         turbines: the jets as they are.
-        inertia: I about the CoM [kg m²], (3, 3).
+        inertia: I about the CoM in the base's axes [kg m²], (3, 3).
         friction: Coulomb's μ [1].
     """
     robot = simulation.robot
@@ -145,7 +145,7 @@ def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, 
         data: MuJoCo's `MjData` of it.
         plan: on the grid of the simulation.
         step: row of the plan.
-        inertia: I about the CoM [kg m²], (3, 3).
+        inertia: I about the CoM in the base's axes [kg m²], (3, 3).
         free: share of the weight that the ground does not carry, from 0 to 1.
     """
     robot = simulation.robot
@@ -156,7 +156,8 @@ def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, 
     lean *= min(1.0, LEAN_MAX / max(float(np.linalg.norm(lean)), 1e-9))
     turn = lean + rotation_vector(plan.rotation[step] @ data.xmat[1].reshape(3, 3).T)  # both small
     spin = plan.angular_momentum[step] - data.subtree_angmom[1]
-    return np.concatenate([linear, ATTITUDE_STIFFNESS * inertia @ turn + ATTITUDE_DAMPING * spin])
+    world = plan.rotation[step] @ inertia @ plan.rotation[step].T
+    return np.concatenate([linear, ATTITUDE_STIFFNESS * world @ turn + ATTITUDE_DAMPING * spin])
 
 
 def _about(origin: Array, before: Array, wrench: Array) -> Array:

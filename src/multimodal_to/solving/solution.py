@@ -132,7 +132,7 @@ def solve(
         trajectory=motion(problem, end.x, solve_json),
         **facts,
         unmet=unmet(problem, end.x, FEASIBLE),
-        units={name: problem.unit(name) for name in violations},
+        units={name: problem.unit_at(name, end.x) for name in violations},
         statistics={**ending.statistics, **environment},
     )
 
@@ -196,7 +196,7 @@ class _Watch:
                 objective=objective,
                 worst=worst,
                 violation=violations[worst],
-                unit=self._problem.unit(worst),
+                unit=self._problem.unit_at(worst, x, rows),
                 elapsed=time.perf_counter() - self._started,
             )
         )

@@ -93,7 +93,7 @@ def _of_bounds(problem: Problem, outside: Array, tolerance: float) -> list[Viola
                     np.tile(np.arange(count), dimension),
                     np.repeat(labels(name, problem.robot), count),
                     np.repeat(scale, count),
-                    np.full(values.size, problem.unit(label)),
+                    np.repeat(problem.variable_units(name), count),
                 )
             )
     interval = "bounds of interval"

@@ -15,7 +15,7 @@ from multimodal_to.adam.spatial import Array, homogeneous
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import Surface, frame_function
 from multimodal_to.trajectory import rules
-from multimodal_to.trajectory.quantities import QUANTITIES, SCALAR, Quantity
+from multimodal_to.trajectory.quantities import QUANTITIES, SCALAR, Quantity, row_units
 from multimodal_to.trajectory.resampling import resample
 from multimodal_to.trajectory.trajectory import Trajectory
 
@@ -70,9 +70,10 @@ class LargestTorque:
     """The largest torque that a motion asks of a joint's motor, either way."""
 
     joint: str
-    torque: float  # [N m], or [N] of a prismatic joint
+    torque: float  # [`unit`]
     when: float  # [s]
     effort: float  # the joint's limit in the same unit; inf where none is known
+    unit: str  # "N m", or "N" of a prismatic joint
 
     @property
     def over_effort(self) -> float:
@@ -381,7 +382,11 @@ def largest_torques(robot: Robot, trajectory: Trajectory) -> tuple[LargestTorque
     known = np.delete(np.arange(trajectory.time.size), without_acceleration(trajectory))
     torques, times = np.abs(joint_torques(robot, trajectory)[:, known]), trajectory.time[known]
     found = [
-        LargestTorque(joint=name, torque=float(row.max()), when=float(times[row.argmax()]), effort=float(effort))
-        for name, row, effort in zip(robot.joint_names, torques, robot.joint_limits.effort, strict=True)
+        LargestTorque(
+            joint=name, torque=float(row.max()), when=float(times[row.argmax()]), effort=float(effort), unit=unit
+        )
+        for name, row, effort, unit in zip(
+            robot.joint_names, torques, robot.joint_limits.effort, row_units(JOINT_TORQUES, robot), strict=True
+        )
     ]
     return tuple(sorted(found, key=lambda one: (-one.over_effort, -one.torque)))

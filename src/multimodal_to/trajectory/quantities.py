@@ -8,6 +8,8 @@ from types import MappingProxyType
 from typing import Protocol
 
 from multimodal_to.errors import InputError, unknown
+from multimodal_to.models.joint_units import joint_units
+from multimodal_to.models.robot import Robot
 
 SCALAR = ("",)
 XYZ = ("x", "y", "z")
@@ -41,7 +43,7 @@ class Quantity:
 
     axes: tuple[str, ...]  # of each body's rows; one empty text where a body has one row
     of: str  # "robot", "joint", "contact" or "jet": what the rows are repeated for
-    unit: str
+    unit: str  # of a joint's row that of a joint that turns; `row_units` has that of each
     frame: str = ""  # whose axes the rows are along; empty where they have no direction in space
     meaning: str
 
@@ -104,6 +106,20 @@ def labels(name: str, bodies: Bodies, *, separator: str = " ") -> tuple[str, ...
     if name not in QUANTITIES:
         raise InputError(unknown("quantity", name, QUANTITIES))
     return row_labels(bodies, QUANTITIES[name].of, QUANTITIES[name].axes, separator=separator)
+
+
+def row_units(quantity: Quantity, robot: Robot, count: int | None = None) -> tuple[str, ...]:
+    """Return the unit of each row of a quantity: that of a joint goes by whether it turns or slides.
+
+    Args:
+        quantity: of `QUANTITIES`, or one that follows from them.
+        robot: whose rows they are.
+        count: of the rows, where the motion has fewer of them than the robot.
+    """
+    if quantity.of == "joint":
+        return tuple(unit for unit in joint_units(robot, quantity.unit) for _ in quantity.axes)
+    bodies = {"robot": 1, "contact": len(robot.contacts), "jet": len(robot.jets)}
+    return (quantity.unit,) * (quantity.rows * bodies[quantity.of] if count is None else count)
 
 
 def row_labels(bodies: Bodies, of: str, axes: Sequence[str], *, separator: str = " ") -> tuple[str, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import LONGEST, InputError, TrajectoryError, listed, shortened, unknown
 from multimodal_to.files.writing import whole
+from multimodal_to.models.attitude import continuous
 from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing, text, texts
 from multimodal_to.trajectory.format import ENTRIES, FORMAT_VERSION, FORMATS
@@ -31,7 +32,8 @@ class Trajectory:
 
     Column k is of knot k or of the interval that ends there, as `rule` says: `trajectory.rules` has the instants. Rates
     of column k are differences of the columns k and k − 1, divided by Δt. All vectors are in world axes; stacked
-    quantities follow the order of `joint_names`, `contact_names` and `jet_names`.
+    quantities follow the order of `joint_names`, `contact_names` and `jet_names`. ρ and −ρ are the same attitude: the
+    base's quaternions have the signs of `attitude.continuous`, whatever they are made with.
 
     Raises:
         TrajectoryError: an array has the wrong shape or is not finite, time does not increase, a name stands twice, or
@@ -90,6 +92,7 @@ class Trajectory:
                 raise TrajectoryError(f"'{label}' are {listed(names)}; expected each name once")
         if np.abs(self.base_quaternion_xyzw).max(axis=0).min() < _NO_ROTATION:
             raise TrajectoryError("'base_quaternion_xyzw' holds a quaternion next to zero, which is no rotation")
+        object.__setattr__(self, "base_quaternion_xyzw", continuous(self.base_quaternion_xyzw))
 
     @property
     def knots(self) -> int:
