@@ -16,7 +16,7 @@ from lxml import etree
 from multimodal_to.adam.lean_tree import build_tree, independent
 from multimodal_to.adam.leftovers import refuse_leftovers, unread
 from multimodal_to.adam.tree import Joint, Link, Mimic, Tree
-from multimodal_to.errors import ModelError, listed, shortened
+from multimodal_to.errors import ModelError, listed, said, shortened
 from multimodal_to.files.numbers import numbers
 from multimodal_to.files.reading import read_bytes
 
@@ -99,7 +99,7 @@ def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
             load_collision_meshes=False,
         ).robot
     except Exception as error:  # yourdfpy raises whatever its parsing runs into
-        raise ModelError(f"{source} is no URDF that can be read: {error}") from error
+        raise ModelError(f"{source} is no URDF that can be read: {said(error)}") from error
     finally:
         logger.setLevel(level)
 
@@ -135,7 +135,7 @@ def _root(urdf: str | os.PathLike[str]) -> tuple[Any, str]:
     except (etree.XMLSyntaxError, ValueError) as error:
         if b"<!DOCTYPE" in text:  # whose entities the parser has stumbled over
             raise ModelError(f"{source} {_ENTITIES}") from error
-        raise ModelError(f"{source} is not valid XML: {error}") from error
+        raise ModelError(f"{source} is not valid XML: {said(error)}") from error
     if root.getroottree().docinfo.internalDTD is not None:
         raise ModelError(f"{source} {_ENTITIES}")
     if root.tag != "robot":
