@@ -12,7 +12,7 @@ import casadi as cs
 import numpy as np
 import pinocchio as pin
 
-from multimodal_to.adam import GRAVITY, KinDynComputations, Representations, quaternion
+from multimodal_to.adam import GRAVITY, KinDynComputations, Representations, Tree, quaternion
 
 IRONCUB = Path(__file__).parents[1] / "robots" / "ironcub"
 BODY = Representations.BODY_FIXED_REPRESENTATION
@@ -97,29 +97,40 @@ def local_from(representation: Representations, H: np.ndarray) -> np.ndarray:
 
 
 class Peer:
-    """Pinocchio's model of a URDF, with joints in our order; joints that we do not move are locked at zero."""
+    """Pinocchio's model of a URDF without its mimic support, which refuses leaders behind their followers.
 
-    def __init__(self, urdf: Path, joint_names: tuple[str, ...]) -> None:
+    Ours is reduced from it: q_full = G s + g, v_full = G ν. Joints that we lock are locked at zero.
+    """
+
+    def __init__(self, urdf: Path, tree: Tree) -> None:
         model = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
-        locked = [index for index, name in enumerate(model.names) if index > 1 and name not in joint_names]
+        moving = {*tree.joint_names, *tree.followers}
+        locked = [index for index, name in enumerate(model.names) if index > 1 and name not in moving]
         self.model = pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
         self.model.gravity.linear = np.array(GRAVITY)
         self.data = self.model.createData()
-        self.joints = [self.model.joints[self.model.getJointId(name)] for name in joint_names]
-        self.columns = np.array([*range(6), *(joint.idx_v for joint in self.joints)])
+        self.tree = tree
+        self.joints = {name: self.model.joints[self.model.getJointId(name)] for name in moving}
 
     def q(self, state: State) -> np.ndarray:
         q = pin.neutral(self.model)
         q[:3], q[3:7] = state.H[:3, 3], pin.Quaternion(state.H[:3, :3]).coeffs()
-        for joint, value in zip(self.joints, state.s, strict=True):
+        values = dict(zip(self.tree.joint_names, state.s, strict=True))
+        values |= {name: how.multiplier * values[how.joint] + how.offset for name, how in self.tree.followers.items()}
+        for name, joint in self.joints.items():
+            value = values[name]
             q[joint.idx_q : joint.idx_q + joint.nq] = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
         return q
 
     def into(self, state: State, representation: Representations) -> np.ndarray:
         """Return the matrix that maps ν in our order and `representation` to Pinocchio's v."""
-        matrix = np.zeros((self.model.nv, 6 + len(self.joints)))
+        names = self.tree.joint_names
+        matrix = np.zeros((self.model.nv, 6 + len(names)))
         matrix[:6, :6] = local_from(representation, state.H)
-        matrix[self.columns[6:], np.arange(6, 6 + len(self.joints))] = 1
+        for column, name in enumerate(names, start=6):
+            matrix[self.joints[name].idx_v, column] = 1
+        for name, how in self.tree.followers.items():
+            matrix[self.joints[name].idx_v, 6 + names.index(how.joint)] = how.multiplier
         return matrix
 
 

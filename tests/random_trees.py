@@ -7,8 +7,11 @@ import numpy as np
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 
 
-def random_urdf(bodies: int, seed: int) -> str:
-    """Return a robot of `bodies` links; a third of the joints have axes and frames at right angles, as real ones do."""
+def random_urdf(bodies: int, seed: int, mimics: float = 0.0) -> str:
+    """Return a robot of `bodies` links; a third of the joints have axes and frames at right angles, as real ones do.
+
+    A share `mimics` of the joints follow others, on any branch, before or after them, or followers themselves.
+    """
     rng = np.random.default_rng(seed)
     parents = [int(rng.integers(max(0, index - 4), index)) for index in range(1, bodies)]
     parts = ['<robot name="random">', _link("link0", rng)]
@@ -16,7 +19,21 @@ def random_urdf(bodies: int, seed: int) -> str:
         massless = index in parents and rng.random() < 0.15  # never at a tip: a joint has to move something
         parts.append(f'<link name="link{index}"/>' if massless else _link(f"link{index}", rng))
         parts.append(_joint(index, parent, rng))
+    if mimics:
+        parts = _with_mimics(parts, mimics, rng)
     return "\n".join([*parts, "</robot>"])
+
+
+def _with_mimics(parts: list[str], share: float, rng: np.random.Generator) -> list[str]:
+    movable = [index for index, part in enumerate(parts) if part.startswith("<joint") and 'type="fixed"' not in part]
+    order = rng.permutation(movable)
+    for place in range(1, len(order)):
+        if rng.random() < share:
+            leader = parts[order[rng.integers(place)]].split('"')[1]  # earlier in the order, so that there is no circle
+            multiplier, offset = rng.choice([-1.0, 1.0, rng.uniform(-2, 2)]), rng.choice([0.0, rng.uniform(-1, 1)])
+            mimic = f'<mimic joint="{leader}" multiplier="{multiplier:.17g}" offset="{offset:.17g}"/></joint>'
+            parts[order[place]] = parts[order[place]].replace("</joint>", mimic)
+    return parts
 
 
 def _text(values: np.ndarray) -> str:

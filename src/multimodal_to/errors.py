@@ -69,6 +69,15 @@ def unknown(kind: str, name: str, available: Iterable[str]) -> str:
     return f"unknown {kind} '{name}'{hint} Available: {listed(names)}"
 
 
+def said(error: BaseException) -> str:
+    r"""Return what another library says of an error, in one line: many write several.
+
+    >>> said(ValueError("mass must be positive\nElement 'base'"))
+    "mass must be positive Element 'base'"
+    """
+    return " ".join(str(error).split())
+
+
 def listed(names: Iterable[str]) -> str:
     """Return names with commas between them; of many, the first ones and how many more there are.
 

@@ -13,16 +13,16 @@ from multimodal_to.adam import KinDynComputations, Representations, quaternion
 from multimodal_to.adam.urdf import read_urdf
 from random_trees import random_urdf
 
-TREES = [(5, 0), (8, 1), (12, 2), (20, 3), (30, 4)]  # bodies, seed
+TREES = [(5, 0), (8, 1), (12, 2), (20, 3), (30, 4), (12, 5, 0.4), (24, 6, 0.6)]  # bodies, seed, share of mimic joints
 REPRESENTATIONS = [MIXED, BODY, INERTIAL]
 RTOL = 1e-9
 
-trees = pytest.mark.parametrize("tree", TREES, ids=lambda tree: f"{tree[0]}-bodies")
+trees = pytest.mark.parametrize("tree", TREES, ids=lambda tree: f"{tree[0]}-bodies" + "-mimics" * len(tree[2:]))
 representations = pytest.mark.parametrize("representation", REPRESENTATIONS, ids=["mixed", "body", "inertial"])
 
 
 @cache
-def robot(tree: tuple[int, int], representation: Representations = MIXED) -> KinDynComputations:
+def robot(tree: tuple, representation: Representations = MIXED) -> KinDynComputations:
     return KinDynComputations(random_urdf(*tree), representation=representation)
 
 
@@ -82,7 +82,7 @@ def close(actual, expected, rtol: float = RTOL) -> None:
 # ---------------------------------------------------------------- bodies one by one, from their own URDF
 
 
-def bodies(tree: tuple[int, int], state: State) -> list[tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+def bodies(tree: tuple, state: State) -> list[tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
     """Return mass, CoM, inertia about it, velocity and angular velocity of every link in world axes."""
     kindyn, links = robot(tree), read_urdf(random_urdf(*tree))[0]
     found = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from pathlib import Path
 
 import casadi as cs
@@ -94,15 +95,28 @@ BAD = {
     "limits the wrong way round": (pair('<limit lower="1" upper="-1" effort="1" velocity="1"/>'), "above its upper"),
     "a limit that is no number": (pair('<limit lower="nan" upper="1" effort="1" velocity="1"/>'), 'lower="nan"'),
     "no mass at all": (robot(link("a", ""), link("b", ""), joint("j", "a", "b")), "no mass"),
-    "a mimic joint that moves": (
+    "a mimic joint of one that does not exist": (
+        pair(f'<mimic joint="left"/>{LIMIT}'),
+        "'j' mimics an unknown joint 'left'",
+    ),
+    "a mimic joint of itself": (pair(f'<mimic joint="j"/>{LIMIT}'), "'j' mimics itself"),
+    "mimic joints in a circle": (
         robot(
-            link("a"),
-            link("b"),
-            link("c"),
-            joint("j", "a", "b"),
-            joint("k", "a", "c", inside=f'<mimic joint="j"/>{LIMIT}'),
+            *(link(name) for name in "abcd"),
+            joint("i", "a", "b", inside=f'<mimic joint="j"/>{LIMIT}'),
+            joint("j", "a", "c", inside=f'<mimic joint="k"/>{LIMIT}'),
+            joint("k", "a", "d", inside=f'<mimic joint="j"/>{LIMIT}'),
         ),
-        "'k' mimics 'j'",
+        "the joints j, k mimic each other in a circle",
+    ),
+    "a mimic joint that moves too far": (
+        robot(
+            *(link(name) for name in "abcd"),
+            joint("i", "a", "b"),
+            joint("j", "a", "c", inside=f'<mimic joint="i" multiplier="1e8"/>{LIMIT}'),
+            joint("k", "a", "d", inside=f'<mimic joint="j" multiplier="1e8"/>{LIMIT}'),
+        ),
+        r"'k' mimics 'i' by the multiplier 1e\+16",
     ),
 }
 
@@ -172,17 +186,94 @@ def test_a_small_wrong_inertia_is_carried_by_the_body_it_is_fixed_to() -> None:
     assert any("negative" in finding.text for finding in describe(robot(*parts)).findings)
 
 
-def test_a_mimic_joint_left_out_is_locked_where_the_other_one_holds_it() -> None:
-    mimic = f'<mimic joint="j" multiplier="2" offset="0.1"/>{LIMIT}'
-    text = robot(link("a"), link("b"), link("c"), joint("j", "a", "b"), joint("k", "a", "c", inside=mimic))
-    assert load_tree(text, []).locked == {"j": 0.0, "k": 0.1}
-    assert load_tree(text, [], {"j": 0.3}).locked == {"j": 0.3, "k": pytest.approx(0.7)}
-    assert load_tree(text, ["j"], {"k": 0.5}).locked == {"k": 0.5}
-    with pytest.raises(ModelError, match="'k' mimics 'j', which moves"):
-        load_tree(text, ["j"])
-    circle = robot(link("a"), link("b"), joint("j", "a", "b", inside=f'<mimic joint="j"/>{LIMIT}'))
-    with pytest.raises(ModelError, match="leads to no joint"):
-        load_tree(circle, [])
+def mimics(**limits: str) -> str:
+    """Return a robot whose joint k follows i at 2 i + 0.1, j follows k at −k + 0.2, and only i moves on its own."""
+    limits = {"i": LIMIT, "j": LIMIT, "k": LIMIT} | limits
+    return robot(
+        *(link(name) for name in "abcd"),
+        joint("j", "a", "b", inside='<axis xyz="0 1 0"/><mimic joint="k" multiplier="-1" offset="0.2"/>' + limits["j"]),
+        joint("i", "a", "c", inside='<axis xyz="0 0 1"/>' + limits["i"]),
+        joint("k", "c", "d", "prismatic", '<mimic joint="i" multiplier="2" offset="0.1"/>' + limits["k"]),
+    )
+
+
+def limit(lower: float, upper: float, effort: float = 10, velocity: float = 5) -> str:
+    return f'<limit lower="{lower}" upper="{upper}" effort="{effort}" velocity="{velocity}"/>'
+
+
+def test_a_mimic_joint_moves_as_its_leader_says() -> None:
+    """A follower of a follower too, on another branch, and before its leader in the file."""
+    tied = KinDynComputations(mimics())
+    assert tied.joint_names == ("i",)
+    assert {name: (how.joint, how.multiplier, how.offset) for name, how in tied.tree.followers.items()} == {
+        "j": ("i", -2.0, pytest.approx(0.1)),
+        "k": ("i", 2.0, 0.1),
+    }
+    free = KinDynComputations(re.sub("<mimic[^>]*>", "", mimics()), ["i", "j", "k"])
+    i = 0.3
+    s = [i, 0.2 - (2 * i + 0.1), 2 * i + 0.1]
+    assert {name: float(at) for name, at in tied.tree.joint_values(np.array([i])).items()} == pytest.approx(
+        dict(zip("ijk", s, strict=True))
+    )
+    G = np.vstack([np.hstack([np.eye(6), np.zeros((6, 1))]), np.hstack([np.zeros((3, 6)), [[1], [-2], [2]]])])
+    for frame in "abcd":
+        expected = np.array(free.forward_kinematics(frame, np.eye(4), s))
+        np.testing.assert_allclose(np.array(tied.forward_kinematics(frame, np.eye(4), [i])), expected, atol=1e-14)
+        J = np.array(free.jacobian(frame, np.eye(4), s)) @ G
+        np.testing.assert_allclose(np.array(tied.jacobian(frame, np.eye(4), [i])), J, atol=1e-14)
+    M = G.T @ np.array(free.mass_matrix(np.eye(4), s)) @ G
+    np.testing.assert_allclose(np.array(tied.mass_matrix(np.eye(4), [i])), M, atol=1e-14)
+
+
+def test_a_mimic_joint_is_locked_where_its_leader_is() -> None:
+    text = mimics()
+    assert load_tree(text, []).locked == {"i": 0.0, "j": pytest.approx(0.1), "k": 0.1}
+    assert load_tree(text, [], {"i": 0.3}).locked == {"i": 0.3, "j": pytest.approx(-0.5), "k": pytest.approx(0.7)}
+    assert load_tree(text, locked={"i": 0.3}).locked == load_tree(text, [], {"i": 0.3}).locked
+    held = load_tree(text, ["i"], {"k": 0.5})  # by hand: what follows it is held by it
+    assert held.locked == {"j": pytest.approx(-0.3), "k": 0.5}
+    assert held.followers == {}
+    with pytest.raises(ModelError, match="'k' mimics 'i' and cannot move on its own; leave it out"):
+        load_tree(text, ["i", "k"])
+
+
+def test_a_mimic_joint_of_a_joint_that_never_moves_is_held_at_its_offset() -> None:
+    follower = joint("k", "a", "c", inside=f'<mimic joint="j" multiplier="2" offset="0.1"/>{LIMIT}')
+    parts = link("a"), link("b"), link("c"), joint("j", "a", "b", "fixed", ""), follower
+    assert load_tree(robot(*parts)).locked == {"k": 0.1}
+    still = pair(), joint("k", "a", "c", inside=f'<mimic joint="j" multiplier="0" offset="0.1"/>{LIMIT}'), link("c")
+    assert load_tree(still[0].replace("</robot>", still[1] + still[2] + "</robot>")).locked == {"k": 0.1}
+
+
+def test_the_limits_of_a_joint_are_kept_by_its_followers() -> None:
+    """k = 2 i + 0.1 and j = −2 i + 0.1: i has what all three ranges leave it, k its speed twice, τ half its force."""
+
+    def limits(**given: str) -> tuple[float, float, float, float]:
+        (leader,) = load_tree(mimics(**given)).joints
+        return leader.lower, leader.upper, leader.velocity, leader.effort
+
+    wide = limit(-9, 9)
+    assert limits(i=limit(-1, 2), j=wide, k=wide) == (-1, 2, 2.5, 10)
+    assert limits(i=limit(-1, 2), j=wide, k=limit(-0.9, 1.1)) == pytest.approx((-0.5, 0.5, 2.5, 10))
+    assert limits(i=limit(-1, 2), j=limit(-1.9, 0.5), k=wide) == pytest.approx((-0.2, 1, 2.5, 10))
+    assert limits(i=limit(-1, 2, 7, 1), j=limit(-9, 9, 3, 4), k=limit(-9, 9, 4, 8)) == pytest.approx((-1, 2, 1, 6))
+    assert limits(i=limit(-1, 2), j=limit(-9, 9, 0, 0), k=limit(-9, 9, 0, 0)) == (-1, 2, 5, 10)  # 0 stands for none
+    assert limits(i=limit(-1, 2), j=wide, k=limit(7, 8)) == (-1, 2, 2.5, 10)  # nothing in common: a finding
+    found = [str(finding) for finding in describe(mimics(i=limit(-1, 2), j=wide, k=limit(7, 8))).findings]
+    assert "joint 'k' follows 'i' at 2 i + 0.1, which leaves its own range 7 to 8" in " ".join(found)
+    assert limits(i=limit(-1, 2), j=wide, k='<limit effort="10" velocity="5"/>')[:2] == (-1, 2)  # it states no range
+
+
+def test_a_description_says_how_a_mimic_joint_follows() -> None:
+    text = str(describe(mimics()))
+    for expected in (
+        "4 links, 1 moving joints (7 degrees",
+        "← k (follows i: 2 i + 0.1)",
+        "mimic joints: 2",
+        "  j = -2 i + 0.1",
+    ):
+        assert expected in text, text
+    assert not [finding for finding in describe(mimics(j=limit(-9, 9), k=limit(-9, 9))).findings]
 
 
 def test_a_locked_joint_is_one_that_stands_still() -> None:
@@ -254,7 +345,13 @@ def test_what_looks_wrong_is_found() -> None:
 
 def test_a_description_names_links_masses_and_what_is_merged_or_locked() -> None:
     text = str(describe(example_robots() / "talos_data/robots/talos_full_v2.urdf"))
-    for expected in ("torso_1_link", " kg", "merged", "gripper_left_inner_double_joint at 0", "looks wrong"):
+    for expected in (
+        "torso_1_link",
+        " kg",
+        "merged",
+        "gripper_left_inner_double_joint = gripper_left_joint",
+        "looks wrong",
+    ):
         assert expected in text
     quiet = str(describe(pair()))
     assert "2 links, 1 moving joints" in quiet

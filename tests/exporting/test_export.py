@@ -13,8 +13,9 @@ from multimodal_to.errors import InputError
 from multimodal_to.exporting import export
 from multimodal_to.models.robot import JointLimits
 from multimodal_to.trajectory import QUANTITIES
-from multimodal_to.trajectory.derived import frame_poses, generalised_forces, joint_torques
+from multimodal_to.trajectory.derived import frame_poses, generalised_forces, joint_torques, sampled
 from synthetic import KNOTS, take_off
+from tied_hopper import FOLLOWERS, tied_hopper
 
 
 @pytest.fixture(scope="module")
@@ -176,3 +177,36 @@ def test_mujoco_has_the_scalar_first_and_only_the_angular_velocity_in_the_base(i
         rotation = frame_poses(ironcub, trajectory, "root_link")[knot, :3, :3]
         np.testing.assert_allclose(rotation @ qvel[knot, 3:6], trajectory.base_angular_velocity[:, knot], atol=1e-12)
     np.testing.assert_array_equal(ctrl[:, 23:], trajectory.thrust.T)
+
+
+def test_mimic_joints_are_where_their_leader_has_them_in_every_export(tmp_path):
+    """Pinocchio's model moves them one by one: it gets them all, and what would move each of them."""
+    robot = tied_hopper(tmp_path)
+    plan = take_off(robot)
+    assert robot.joint_names == ("left_pitch",)
+    angle, rate = sampled(plan).joint_positions[0], sampled(plan).joint_velocities[0]
+    expected = {"left_pitch": (angle, rate)}
+    expected |= {name: (m * angle + o, m * rate) for name, (m, o) in FOLLOWERS.items()}
+    still = replace(plan, **{name: 0.0 * getattr(plan, name) for name in STILL}, thrust=0.0 * plan.thrust)
+    for found, knot, torques in agrees_with_pinocchio(robot, still, tmp_path / "p.npz"):
+        names = found["joint_names"].tolist()
+        assert names == ["left_pitch", "mast", "right_pitch"]
+        np.testing.assert_allclose(found["q"][:, 7:].T, [expected[name][0] for name in names], atol=1e-15)
+        if 0 < knot < KNOTS:
+            np.testing.assert_allclose(found["tau"][knot], torques[6:], atol=1e-8)
+    velocities = read(export.write_pinocchio(robot, plan, tmp_path / "p.npz"))["v"][:, 6:].T
+    np.testing.assert_allclose(velocities, [expected[name][1] for name in names], atol=1e-15)
+    qpos = read(export.write_mujoco(robot, plan, tmp_path / "m.npz"))
+    for name, values in zip(qpos["joint_names"].tolist(), qpos["qpos"][:, 7:].T, strict=True):
+        np.testing.assert_allclose(values, expected[name][0], atol=1e-15)
+
+    table = export.columns(robot, plan)
+    mat = pytest.importorskip("scipy.io").loadmat(
+        export.write_mat(robot, plan, tmp_path / "m.mat"), simplify_cells=True
+    )
+    for index, (name, unit) in enumerate((("right_pitch", "rad"), ("mast", "m"))):
+        assert table[f"follower_positions.{name}"][0] == unit
+        assert table[f"follower_velocities.{name}"][0] == f"{unit}/s"
+        np.testing.assert_allclose(table[f"follower_positions.{name}"][1], expected[name][0], atol=1e-15)
+        assert mat["follower_names"][index] == name
+        np.testing.assert_allclose(mat["follower_velocities"][index], expected[name][1], atol=1e-15)

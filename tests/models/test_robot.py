@@ -8,6 +8,7 @@ import pytest
 
 from multimodal_to.errors import ModelError
 from multimodal_to.models.robot import bundled_robots, load_robot
+from tied_hopper import tied_hopper
 
 
 @pytest.fixture
@@ -177,3 +178,22 @@ def test_an_unknown_robot_is_named_with_those_that_exist():
 def test_an_unknown_group_is_named_with_those_that_exist(ironcub):
     with pytest.raises(ModelError, match="unknown joint group 'leg'; did you mean"):
         ironcub.group_indices("leg")
+
+
+def test_a_joint_that_others_follow_is_planned_in_the_range_that_they_allow(tmp_path):
+    """The right wing is at 0.8 q + 0.05 and goes to ±0.8 rad; the mast at 0.1 q + 0.1 in 0 to 0.2 m, at 1 m/s."""
+    limits = tied_hopper(tmp_path).joint_limits
+    assert (limits.lower.item(), limits.upper.item()) == (-0.8, 0.8)
+    assert (limits.speed.item(), limits.effort.item()) == (3.0, 5.0)  # the mast's 50 N at 0.1 m/rad
+    urdf = tmp_path / "hopper.urdf"
+    narrow = urdf.read_text(encoding="utf-8").replace(
+        'upper="0.2" effort="50" velocity="1"', 'upper="0.12" effort="50" velocity="0.2"'
+    )
+    urdf.write_text(narrow, encoding="utf-8")
+    limits = load_robot(tmp_path).joint_limits
+    assert limits.upper.item() == pytest.approx(0.2)
+    assert limits.speed.item() == pytest.approx(2.0)
+    table = tmp_path / "robot.toml"
+    table.write_text(table.read_text(encoding="utf-8").replace("home = 0.0", "home = 0.5"), encoding="utf-8")
+    with pytest.raises(ModelError, match=r"home 0.5 of 'left_pitch' is not within -0.8 to 0.2, the range in which its"):
+        load_robot(tmp_path)

@@ -10,8 +10,9 @@ from collections.abc import Mapping
 
 import casadi as cs
 
+from multimodal_to.adam.crba import mass_matrix
 from multimodal_to.adam.kinematics import Pose, joint_pose
-from multimodal_to.adam.rnea import applied_wrenches
+from multimodal_to.adam.rnea import applied_wrenches, inverse_dynamics
 from multimodal_to.adam.spatial import SX, Inertia, symmetric
 from multimodal_to.adam.tree import BASE, Tree
 
@@ -28,6 +29,9 @@ def forward_dynamics(
 ) -> SX:
     """Return ν̇ = (p̈, ω̇, s̈), (6 + n, 1): the articulated body algorithm (ABA).
 
+    Bodies whose joints follow others cannot be articulated one by one: of such a robot, M ν̇ = (0, τ) − h is solved,
+    with M by CRBA and h by RNEA.
+
     Args:
         tree: the robot.
         base: w_H_base, the pose of the base in the world.
@@ -39,12 +43,16 @@ def forward_dynamics(
         wrenches: by frame name, the (force, moment) that the world applies there, at the frame's origin, world axes.
     """
     n = len(tree.joints)
+    if tree.followers:
+        rest = cs.SX(6, 1), cs.SX(n, 1)
+        bias = inverse_dynamics(tree, base, s, base_twist, s_dot, *rest, gravity, wrenches)
+        return _solved(mass_matrix(tree, base, s), cs.vertcat(cs.SX(6, 1), torques) - bias)
     # what the bodies would need at zero ν̇: the bias wrenches, with gravity, as RNEA sees them
     poses = [base] + [joint_pose(body, s) for body in tree.bodies[1:]]
     omegas = [base.rotation.T @ base_twist[3:]]
     shifts: list[SX] = [cs.SX(6, 1)]  # velocity-dependent part of each body's (a, α) less its parent's, in body axes
     for body, pose in zip(tree.bodies[1:], poses[1:], strict=True):
-        omega, rate = omegas[body.parent], s_dot[body.column]
+        omega, rate = omegas[body.parent], body.joint_value(s_dot)
         back = pose.rotation.T
         centripetal = back @ cs.cross(omega, cs.cross(omega, pose.translation))
         omega = back @ omega
@@ -76,7 +84,7 @@ def forward_dynamics(
         biases[body.parent] = biases[body.parent] + motion.T @ bias
 
     # the base, then outward
-    accelerations = [cs.ldl_solve(-biases[BASE], *cs.ldl(inertias[BASE], False))]
+    accelerations = [_solved(inertias[BASE], -biases[BASE])]
     result = cs.SX(6 + n, 1)
     for index in range(1, len(tree.bodies)):
         body = tree.bodies[index]
@@ -91,6 +99,11 @@ def forward_dynamics(
     result[:3] = base.rotation @ accelerations[BASE][:3] + gravity
     result[3:6] = base.rotation @ accelerations[BASE][3:]
     return result
+
+
+def _solved(matrix: SX, right: SX) -> SX:
+    """Return x of A x = b, with A symmetric and positive."""
+    return cs.ldl_solve(right, *cs.ldl(matrix, False))
 
 
 def _spatial(inertia: Inertia) -> SX:

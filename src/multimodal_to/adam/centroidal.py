@@ -84,7 +84,7 @@ def body_motions(tree: Tree, s: SX, velocity: SX, omega: SX, s_dot: SX) -> BodyM
     velocities, omegas = [velocity], [omega]
     for body, pose in zip(tree.bodies[1:], poses[1:], strict=True):
         parent, back = body.parent, pose.rotation.T
-        along_z = cs.vertcat(0, 0, s_dot[body.column])
+        along_z = cs.vertcat(0, 0, body.joint_value(s_dot))
         omega = back @ omegas[parent]
         velocity = back @ (velocities[parent] + cs.cross(omegas[parent], pose.translation))
         omegas.append(omega if body.prismatic else omega + along_z)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import casadi as cs
 
 from multimodal_to.adam.centroidal import body_motions
-from multimodal_to.adam.crba import joint_motions, to_base, unit_momenta
+from multimodal_to.adam.crba import gathered, joint_motions, to_base, unit_momenta
 from multimodal_to.adam.kinematics import Pose
 from multimodal_to.adam.spatial import SX
 from multimodal_to.adam.tree import BASE, Tree
@@ -20,8 +20,8 @@ def coriolis_matrix(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX) ->
 
     C = Σ Jᵀ (I J̇ + B J) over the bodies with B = ½ (v×* I − I v× + (I v)×̄*), which maps a motion (w, ϖ) to the force
     −l × ϖ and the moment D ϖ, where D = −S(h) S(v) − S(ω) (½ tr(I) 1 − I). As in CRBA, sums over the bodies that hang
-    on a joint are gathered inward first. The base's linear velocity does not enter: seen from a frame that moves along
-    with it, the robot is the same.
+    on a joint are gathered inward first; joints are those of the bodies, until the end. The base's linear velocity does
+    not enter: seen from a frame that moves along with it, the robot is the same.
 
     Args:
         tree: the robot.
@@ -45,10 +45,11 @@ def coriolis_matrix(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX) ->
         turned = pose.rotation @ turnings[index] @ pose.rotation.T
         turnings[parent] = turnings[parent] + turned - cs.skew(pose.translation) @ cs.skew(linear)
 
-    n = len(tree.joints)
+    n = len(tree.bodies) - 1
     motions = joint_motions(tree, units.poses)
     rates, wrenches, turns = cs.SX(6, n), cs.SX(6, n), cs.SX(3, n)
-    for index, body in enumerate(tree.bodies[1:], start=1):
+    for joint, body in enumerate(tree.bodies[1:]):
+        index = joint + 1
         pose, inertia = units.poses[index], units.composites[index]
         (vx, vy, _), (wx, wy, _) = cs.vertsplit(bodies.velocities[index]), cs.vertsplit(bodies.omegas[index])
         around, along = cs.vertcat(wy, -wx, 0), cs.vertcat(vy, -vx, 0)  # ω × z, v × z
@@ -62,22 +63,22 @@ def coriolis_matrix(tree: Tree, base: Pose, s: SX, base_twist: SX, s_dot: SX) ->
             turn = turnings[index][2, :].T
         force = force + inertia.mass * rate + cs.cross(angular_rate, inertia.first_moment)
         moment = moment + inertia.about_origin @ angular_rate + cs.cross(inertia.first_moment, rate)
-        wrenches[:, body.column] = to_base(pose, force, moment)
+        wrenches[:, joint] = to_base(pose, force, moment)
         angular_rate = pose.rotation @ angular_rate
-        rates[:3, body.column] = pose.rotation @ rate + cs.cross(pose.translation, angular_rate)
-        rates[3:, body.column] = angular_rate
-        turns[:, body.column] = pose.rotation @ turn
+        rates[:3, joint] = pose.rotation @ rate + cs.cross(pose.translation, angular_rate)
+        rates[3:, joint] = angular_rate
+        turns[:, joint] = pose.rotation @ turn
 
     matrix = cs.SX(6 + n, 6 + n)
     matrix[:3, 3:6] = -cs.skew(base.rotation @ momenta[BASE])
     matrix[3:6, 3:6] = base.rotation @ turnings[BASE] @ base.rotation.T
     matrix[:6, 6:] = wrenches
     matrix[6:, 3:6] = turns.T
-    for index, body in enumerate(tree.bodies):
+    for index in range(len(tree.bodies)):
         for above in tree.path(index):
-            i, j = body.column, tree.bodies[above].column
+            i, j = index - 1, above - 1
             matrix[6 + j, 6 + i] = cs.dot(motions[:, j], wrenches[:, i])
             if i != j:
-                carried = cs.dot(units.columns[:, 6 + i], rates[:, j])
+                carried = cs.dot(units.joints[:, i], rates[:, j])
                 matrix[6 + i, 6 + j] = carried + cs.dot(turns[:, i], motions[3:, j])
-    return cs.sparsify(matrix)
+    return cs.sparsify(gathered(tree, matrix))

@@ -20,7 +20,8 @@ from multimodal_to.adam.tree import BASE, Tree
 class UnitMomenta:
     """What a unit of each velocity sets moving, seen from the base's origin in the axes of the base's pose."""
 
-    columns: SX  # (6, 6 + n): momentum (l, k) for a unit of each of (ṗ, ω, ṡ)
+    base: SX  # (6, 6): momentum (l, k) for a unit of each of (ṗ, ω)
+    joints: SX  # (6, bodies − 1): for a unit of each body's joint, in the order of the bodies
     poses: list[Pose]  # of the bodies, from the base's origin
     com: SX  # [m], (3, 1)
     composites: list[Inertia]  # of each body with all that hangs on it, in its own frame
@@ -40,19 +41,20 @@ def unit_momenta(tree: Tree, base: Pose, s: SX) -> UnitMomenta:
     composites = composite_inertias(tree, s)
     poses = body_poses(tree, Pose(base.rotation, cs.SX.zeros(3)), s)
     whole = composites[BASE].rotated(base.rotation)
-    columns = cs.SX(6, 6 + len(tree.joints))
-    columns[:3, :3] = tree.total_mass * cs.SX.eye(3)
-    columns[3:, :3] = cs.skew(whole.first_moment)
-    columns[:3, 3:6] = -cs.skew(whole.first_moment)
-    columns[3:, 3:6] = whole.about_origin
+    of_base, of_joints = cs.SX(6, 6), []
+    of_base[:3, :3] = tree.total_mass * cs.SX.eye(3)
+    of_base[3:, :3] = cs.skew(whole.first_moment)
+    of_base[:3, 3:] = -cs.skew(whole.first_moment)
+    of_base[3:, 3:] = whole.about_origin
     for body, composite, pose in zip(tree.bodies[1:], composites[1:], poses[1:], strict=True):
         x, y, _ = cs.vertsplit(composite.first_moment)
         if body.prismatic:
             linear, angular = cs.vertcat(0, 0, composite.mass), cs.vertcat(y, -x, 0)
         else:
             linear, angular = cs.vertcat(-y, x, 0), composite.about_origin[:, 2]
-        columns[:, 6 + body.column] = to_base(pose, linear, angular)
-    return UnitMomenta(columns, poses, whole.first_moment / tree.total_mass, composites)
+        of_joints.append(to_base(pose, linear, angular))
+    joints = cs.horzcat(cs.SX(6, 0), *of_joints)
+    return UnitMomenta(of_base, joints, poses, whole.first_moment / tree.total_mass, composites)
 
 
 def to_base(pose: Pose, linear: SX, angular: SX) -> SX:
@@ -68,23 +70,29 @@ def to_base(pose: Pose, linear: SX, angular: SX) -> SX:
 
 
 def joint_motions(tree: Tree, poses: list[Pose]) -> SX:
-    """Return what a unit of each joint's velocity does at the base's origin, (6, n): (p × a, a), or (a, 0)."""
-    motions = cs.SX(6, len(tree.joints))
-    for body, pose in zip(tree.bodies[1:], poses[1:], strict=True):
+    """Return what a unit of each body's joint does at the base's origin, (6, bodies − 1): (p × a, a), or (a, 0)."""
+    motions = cs.SX(6, len(tree.bodies) - 1)
+    for joint, (body, pose) in enumerate(zip(tree.bodies[1:], poses[1:], strict=True)):
         axis = pose.rotation[:, 2]
         if body.prismatic:
-            motions[:3, body.column] = axis
+            motions[:3, joint] = axis
         else:
-            motions[:3, body.column] = cs.cross(pose.translation, axis)
-            motions[3:, body.column] = axis
+            motions[:3, joint] = cs.cross(pose.translation, axis)
+            motions[3:, joint] = axis
     return motions
+
+
+def gathered(tree: Tree, matrix: SX) -> SX:
+    """Return Gᵀ A G, (6 + n, 6 + n), of a matrix over the base and the bodies' joints: `Tree.coupling` is their G."""
+    coupling = cs.diagcat(cs.DM.eye(6), tree.coupling)
+    return coupling.T @ matrix @ coupling
 
 
 def mass_matrix(tree: Tree, base: Pose, s: SX) -> SX:
     """Return M(q), (6 + n, 6 + n), for ν = (ṗ_base, ω_base, ṡ): the composite rigid body algorithm (CRBA).
 
     M_ij of joint i and a joint j above it is the momentum that joint i gives, along the motion of joint j; joints on
-    different branches do not meet.
+    different branches do not meet. Joints are those of the bodies first, and then gathered into those of s.
 
     Args:
         tree: the robot.
@@ -93,15 +101,14 @@ def mass_matrix(tree: Tree, base: Pose, s: SX) -> SX:
     """
     units = unit_momenta(tree, base, s)
     motions = joint_motions(tree, units.poses)
-    matrix = cs.SX(6 + len(tree.joints), 6 + len(tree.joints))
-    matrix[:6, :] = units.columns
-    for index, body in enumerate(tree.bodies):
+    joints = len(tree.bodies) - 1
+    matrix = cs.SX(6 + joints, 6 + joints)
+    matrix[:6, :] = cs.horzcat(units.base, units.joints)
+    for index in range(len(tree.bodies)):
         for above in tree.path(index):
-            i, j = body.column, tree.bodies[above].column
-            low, high = sorted((6 + i, 6 + j))
-            motion, momentum = motions[:, j], units.columns[:, 6 + i]
-            matrix[low, high] = cs.dot(motion[3:], momentum[3:]) + cs.dot(motion[:3], momentum[:3])
-    return cs.sparsify(symmetric(matrix))
+            motion, momentum = motions[:, above - 1], units.joints[:, index - 1]
+            matrix[5 + above, 5 + index] = cs.dot(motion[3:], momentum[3:]) + cs.dot(motion[:3], momentum[:3])
+    return cs.sparsify(symmetric(gathered(tree, symmetric(matrix))))
 
 
 def centroidal_momentum_matrix(tree: Tree, base: Pose, s: SX) -> SX:
@@ -113,10 +120,11 @@ def centroidal_momentum_matrix(tree: Tree, base: Pose, s: SX) -> SX:
         s: joint positions, (n, 1) [rad or m].
     """
     units = unit_momenta(tree, base, s)
-    matrix = cs.SX(units.columns)
+    columns = cs.horzcat(units.base, units.joints @ tree.coupling)
+    matrix = cs.SX(columns)
     matrix[3:, :3] = 0
     for column in range(3, 6 + len(tree.joints)):
-        matrix[3:, column] = units.columns[3:, column] - cs.cross(units.com, units.columns[:3, column])
+        matrix[3:, column] = columns[3:, column] - cs.cross(units.com, columns[:3, column])
     matrix[3:, 3:6] = symmetric(matrix[3:, 3:6])
     return cs.sparsify(matrix)
 
@@ -129,4 +137,5 @@ def com_jacobian(tree: Tree, base: Pose, s: SX) -> SX:
         base: w_H_base, the pose of the base in the world.
         s: joint positions, (n, 1) [rad or m].
     """
-    return cs.sparsify(unit_momenta(tree, base, s).columns[:3, :] / tree.total_mass)
+    units = unit_momenta(tree, base, s)
+    return cs.sparsify(cs.horzcat(units.base, units.joints @ tree.coupling)[:3, :] / tree.total_mass)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multimodal_to.adam.lean_tree import build_tree
+from multimodal_to.adam.lean_tree import build_tree, independent
 from multimodal_to.adam.singular import described, massless_motions
-from multimodal_to.adam.tree import Joint, Link, Tree
+from multimodal_to.adam.tree import Joint, Link, Mimic, Tree
 from multimodal_to.adam.urdf import read_urdf, unread_elements
 
 EFFORT_PLACEHOLDER = 1e4
@@ -43,7 +43,7 @@ class Branch:
     depth: int
     link: Link
     joint: Joint | None
-    state: str  # "base", "moves", "fixed", or "locked at ..."
+    state: str  # "base", "moves", "fixed", "follows ...", or "locked at ..."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +64,8 @@ class Description:
             "",
             f"frames: {len(tree.frames)}, one for each link; merged into the body they move with: {len(tree.merged)}",
             *(f"  {link} → {body}" for link, body in tree.merged.items()),
+            f"mimic joints: {len(tree.followers)}",
+            *(f"  {joint} = {how}" for joint, how in tree.followers.items()),
             f"locked joints: {len(tree.locked)}",
             *(f"  {joint} at {value:g}" for joint, value in tree.locked.items()),
             f"looks wrong: {len(self.findings)}",
@@ -77,7 +79,7 @@ def describe(
     joint_names: Sequence[str] | None = None,
     locked: Mapping[str, float] | None = None,
 ) -> Description:
-    """Return what a URDF holds; by default all joints move that can, and those that mimic another are locked.
+    """Return what a URDF holds; by default all joints move that can, and those that mimic another follow it.
 
     Args:
         urdf: path of a URDF, or its XML text.
@@ -90,10 +92,7 @@ def describe(
     links, joints = read_urdf(urdf)
     locked = dict(locked or {})
     if joint_names is None:
-        for joint in joints:
-            if joint.mimic is not None and joint.kind != "fixed":
-                locked.setdefault(joint.name, 0.0)
-        joint_names = [joint.name for joint in joints if joint.kind != "fixed" and joint.name not in locked]
+        joint_names = independent(joints, locked)
     tree = build_tree(links, joints, joint_names, locked)
     unread = (
         Finding(subject=owner, text=f"holds {elements}, which is not known and not read")
@@ -113,15 +112,16 @@ def findings(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tupl
         joints: of the URDF.
     """
     found = [Finding(subject=f"link '{link.name}'", text=text) for link in links for text in _link_findings(link)]
-    moving, carried = set(tree.joint_names), _carried_masses(links, joints)
+    moving, carried = {joint.name: joint for joint in tree.joints}, _carried_masses(tree, links, joints)
     for joint in joints:
         texts = list(joint.remarks)
-        if joint.kind != "fixed":
-            texts += _joint_findings(joint, carried[joint.child] if joint.name in moving else None)
+        if joint.name in tree.followers:
+            texts += _follower_findings(joint, tree.followers[joint.name], moving)
+        elif joint.kind != "fixed":
+            texts += _joint_findings(moving.get(joint.name, joint), carried.get(joint.name))
         found += [Finding(subject=f"joint '{joint.name}'", text=text) for text in texts]
-    child = {joint.name: joint.child for joint in joints}
     for group in massless_motions(tree):
-        if len(group) > 1 or not group[0] or carried[child[group[0]]] > 0:  # else the joint itself has said it
+        if len(group) > 1 or not group[0] or carried[group[0]] > 0:  # else the joint itself has said it
             subject, text = described(tree, group)
             found.append(Finding(subject=subject, text=text))
     return tuple(found)
@@ -165,13 +165,38 @@ def _joint_findings(joint: Joint, carried_mass: float | None) -> Iterator[str]:
         yield f"has the range {joint.lower:g} to {joint.upper:g}, so it cannot move"
     if joint.kind == "revolute" and joint.upper - joint.lower > 4 * np.pi and np.isfinite(joint.upper - joint.lower):
         yield f"has the range {joint.lower:g} to {joint.upper:g} rad, which looks like a placeholder or degrees"
-    if joint.mimic is not None:
-        yield f"mimics '{joint.mimic.joint}', which is not supported"
     if carried_mass == 0:
         yield "moves nothing that has mass, so its acceleration is undefined"
 
 
-def _carried_masses(links: Sequence[Link], joints: Sequence[Joint]) -> dict[str, float]:
+def _follower_findings(joint: Joint, how: Mimic, moving: Mapping[str, Joint]) -> Iterator[str]:
+    """Yield what looks wrong about how a joint follows another.
+
+    Args:
+        joint: the follower.
+        how: it follows.
+        moving: the joints that move on their own, by name, in ranges that their followers keep if they can.
+    """
+    leader = moving[how.joint]
+    ends = sorted(how.multiplier * end + how.offset for end in (leader.lower, leader.upper))
+    if ends[0] < joint.lower - _ROUNDING or ends[1] > joint.upper + _ROUNDING:
+        yield (
+            f"follows '{how.joint}' at {how}, which leaves its own range {joint.lower:g} to {joint.upper:g}: no range "
+            f"of '{how.joint}' keeps all that follow it in theirs"
+        )
+
+
+def _carried_masses(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> dict[str, float]:
+    """Return for each joint that moves on its own the mass [kg] that it and its followers carry."""
+    below, carried = _masses_below(links, joints), dict.fromkeys(tree.joint_names, 0.0)
+    for joint in joints:
+        leader = tree.followers[joint.name].joint if joint.name in tree.followers else joint.name
+        if leader in carried:
+            carried[leader] += below[joint.child]
+    return carried
+
+
+def _masses_below(links: Sequence[Link], joints: Sequence[Joint]) -> dict[str, float]:
     """Return for each link the mass [kg] of all that hangs on it, itself included."""
     above = {joint.child: joint.parent for joint in joints}
     carried = dict.fromkeys((link.name for link in links), 0.0)
@@ -194,7 +219,9 @@ def _branches(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tup
         depth, name, state, above = pending.pop()
         branches.append(Branch(depth=depth, link=link_of[name], joint=above, state=state))
         for joint in reversed(below.get(name, [])):
-            if joint.name in tree.locked:
+            if joint.name in tree.followers:
+                state = f"follows {tree.followers[joint.name].joint}: {tree.followers[joint.name]}"
+            elif joint.name in tree.locked:
                 state = f"locked at {tree.locked[joint.name]:g}"
             else:
                 state = "fixed" if joint.kind == "fixed" else "moves"

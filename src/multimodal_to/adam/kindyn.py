@@ -34,7 +34,7 @@ class KinDynComputations(Library):
 
     Args:
         urdfstring: path of a URDF, or its XML text (adam's name).
-        joints_name_list: joints that move, in the order of s; by default all that can.
+        joints_name_list: joints that move, in the order of s; by default all that can. Mimic joints follow theirs.
         root_link: the base, named as a check; a URDF has only one root.
         gravity: acceleration of free fall in world axes [m/s²]: three numbers, or six with adam's three zeros behind.
         f_opts: options of every `casadi.Function` that is built, for example `{"jit": True}`; none by default.

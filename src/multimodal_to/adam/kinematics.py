@@ -28,7 +28,7 @@ class Pose:
 def joint_angle(body: Body, s: SX) -> tuple[SX, SX]:
     """Return cos and sin of a revolute joint's angle, measured from where its body's x stands."""
     quarter = body.offset / (math.pi / 2)
-    angle = s[body.column]
+    angle = body.joint_value(s)
     if abs(quarter - round(quarter)) > 1e-12:
         angle, quarter = angle + body.offset, 0
     cosine, sine = cs.cos(angle), cs.sin(angle)
@@ -39,7 +39,7 @@ def joint_angle(body: Body, s: SX) -> tuple[SX, SX]:
 def joint_pose(body: Body, s: SX) -> Pose:
     """Return the body's frame in its parent's: C Rz(q) for a revolute joint, a shift along z for a prismatic one."""
     if body.prismatic:
-        return Pose(body.rotation, body.translation + body.rotation[:, 2] * s[body.column])
+        return Pose(body.rotation, body.translation + body.rotation[:, 2] * body.joint_value(s))
     return Pose(body.rotation @ rotation_about_z(*joint_angle(body, s)), body.translation)
 
 
@@ -127,19 +127,20 @@ class Chain:
 def geometric_jacobian(chain: Chain, n: int) -> SX:
     """Return J, (6, 6 + n), of the chain's end: (ṗ_frame, ω_frame) = J ν for ν = (ṗ_base, ω_base, ṡ).
 
-    The column of a revolute joint at p_i with axis a_i is (a_i × (p_frame − p_i), a_i), of a prismatic one (a_i, 0).
+    The column of a revolute joint at p_i with axis a_i is (a_i × (p_frame − p_i), a_i), of a prismatic one (a_i, 0);
+    a mimic joint adds its own, times its multiplier, to its leader's.
     """
     end = chain.end.translation
     jacobian = cs.SX(6, 6 + n)
     jacobian[:3, :3] = jacobian[3:, 3:6] = cs.SX.eye(3)
     jacobian[:3, 3:6] = -cs.skew(end - chain.base.translation)
     for body, pose in chain.bodies:
-        axis = pose.rotation[:, 2]
+        axis = body.multiplier * pose.rotation[:, 2]
         if body.prismatic:
-            jacobian[:3, 6 + body.column] = axis
+            jacobian[:3, 6 + body.column] += axis
         else:
-            jacobian[:3, 6 + body.column] = cs.cross(axis, end - pose.translation)
-            jacobian[3:, 6 + body.column] = axis
+            jacobian[:3, 6 + body.column] += cs.cross(axis, end - pose.translation)
+            jacobian[3:, 6 + body.column] += axis
     return cs.sparsify(jacobian)
 
 
@@ -167,7 +168,7 @@ def chain_motions(chain: Chain, base: Motion, s_dot: SX) -> list[Motion]:
     motions, origin = [base], chain.base.translation
     for body, pose in chain.bodies:
         last = _carried(motions[-1], pose.translation - origin)
-        own = pose.rotation[:, 2] * s_dot[body.column]
+        own = pose.rotation[:, 2] * body.joint_value(s_dot)
         turned = cs.cross(last.angular, own)
         if body.prismatic:
             last = Motion(last.linear + own, last.angular, last.linear_rate + 2 * turned, last.angular_rate)
@@ -203,12 +204,12 @@ def geometric_jacobian_rate(chain: Chain, motions: list[Motion], n: int) -> SX:
     rate = cs.SX(6, 6 + n)
     rate[:3, 3:6] = -cs.skew(last - motions[0].linear)
     for (body, pose), motion in zip(chain.bodies, motions[1:-1], strict=True):
-        axis = pose.rotation[:, 2]
+        axis = body.multiplier * pose.rotation[:, 2]
         turned = cs.cross(motion.angular, axis)
         if body.prismatic:
-            rate[:3, 6 + body.column] = turned
+            rate[:3, 6 + body.column] += turned
         else:
             arm = cs.cross(turned, end - pose.translation)
-            rate[:3, 6 + body.column] = arm + cs.cross(axis, last - motion.linear)
-            rate[3:, 6 + body.column] = turned
+            rate[:3, 6 + body.column] += arm + cs.cross(axis, last - motion.linear)
+            rate[3:, 6 + body.column] += turned
     return cs.sparsify(rate)

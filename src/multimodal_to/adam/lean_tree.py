@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as cs
 import numpy as np
@@ -27,8 +27,9 @@ from multimodal_to.adam.spatial import Inertia, rotation_from_rpy
 from multimodal_to.adam.tree import BASE, Body, Frame, Joint, Link, Mimic, Tree
 from multimodal_to.errors import ModelError, listed, unknown
 
-_SNAP = 1e-12
-"""Entries of constant rotations and offsets closer than this to 0 or ±1 are taken as meant [1, m]."""
+_SNAP, _FINE_SNAP = 1e-12, 1e-14
+"""Entries of constant rotations and offsets closer than this to 0 or ±1 are taken as meant [1, m]. The fine one holds
+for a robot whose angles were rounded to about this size, as 1.57079632679: the other would catch some of them only."""
 _PARALLEL = 1e-3
 """Axes whose angle has a smaller sine count as parallel: their common normal would be too far away."""
 _NOISE = 1e-16
@@ -46,6 +47,7 @@ class _Draft:
     name: str
     parent: int
     joint: Joint | None
+    follows: Mimic | None  # of the moving joints; itself, once, where it is one of them
     rotation: np.ndarray
     translation: np.ndarray
     inertia: Inertia = field(default_factory=Inertia.zero)
@@ -57,10 +59,10 @@ class _Draft:
 def build_tree(
     links: Sequence[Link], joints: Sequence[Joint], moving: Sequence[str], locked: Mapping[str, float] | None = None
 ) -> Tree:
-    """Return the tree of a robot in which only the joints named in `moving` move, in that order.
+    """Return the tree of a robot in which the joints named in `moving` move, in that order, and those that mimic them.
 
     Every other joint that could move is held at its value in `locked` [rad or m], or at zero, or, when it mimics
-    another, where that one holds it.
+    another, where that one holds it. A mimic joint that is named in `locked` is held there, whatever moves.
 
     Args:
         links: of the URDF.
@@ -69,16 +71,17 @@ def build_tree(
         locked: positions of other joints, by name [rad or m].
 
     Raises:
-        ModelError: the links and joints form no tree with one root, a name is unknown or given twice, a joint that
-            moves mimics another or is mimicked, or the masses are no robot's.
+        ModelError: the links and joints form no tree with one root, a name is unknown or given twice, a joint of
+            `moving` mimics another, mimic joints lead nowhere, or the masses are no robot's.
     """
     by_name = {joint.name: joint for joint in joints}
     _check_names(by_name, moving, locked or {})
-    held = _held(by_name, moving, locked or {})
+    held, followers = _held_and_following(by_name, moving, locked or {})
+    follows = {name: Mimic(joint=name) for name in moving} | followers
     root, below = _connect(links, joints)
     link_of = {link.name: link for link in links}
     columns = {name: column for column, name in enumerate(moving)}
-    drafts = [_Draft(name=root, parent=-1, joint=None, rotation=np.eye(3), translation=np.zeros(3))]
+    drafts = [_Draft(name=root, parent=-1, joint=None, follows=None, rotation=np.eye(3), translation=np.zeros(3))]
 
     pending = [(root, BASE, np.eye(3), np.zeros(3))]
     while pending:
@@ -88,34 +91,43 @@ def build_tree(
         for joint in reversed(below.get(name, [])):
             child_rotation = rotation @ joint.rotation
             child_translation = translation + rotation @ joint.translation
-            if joint.name in columns:
-                child = _Draft(
-                    name=joint.child, parent=body, joint=joint, rotation=child_rotation, translation=child_translation
-                )
-                drafts[body].children.append(child)
-                drafts.append(child)
-                pending.append((joint.child, len(drafts) - 1, np.eye(3), np.zeros(3)))
+            how = follows.get(joint.name)
+            if joint.kind != "fixed":  # a follower starts where it is when its leader is at zero
+                start = held[joint.name] if how is None else how.offset
+                child_rotation, child_translation = _displaced(joint, start, child_rotation, child_translation)
+            if how is None:
+                pending.append((joint.child, body, child_rotation, child_translation))
                 continue
-            if joint.kind != "fixed":
-                child_rotation, child_translation = _displaced(
-                    joint, held[joint.name], child_rotation, child_translation
-                )
-            pending.append((joint.child, body, child_rotation, child_translation))
+            child = _Draft(
+                name=joint.child,
+                parent=body,
+                joint=joint,
+                follows=how,
+                rotation=child_rotation,
+                translation=child_translation,
+            )
+            drafts[body].children.append(child)
+            drafts.append(child)
+            pending.append((joint.child, len(drafts) - 1, np.eye(3), np.zeros(3)))
 
     _check_masses(drafts)
     for draft in drafts[1:]:
         _choose_frame(draft)
+    snap = _snap(drafts[1:])
     for draft in reversed(drafts[1:]):
-        _regroup(draft, drafts[draft.parent])
+        _regroup(draft, drafts[draft.parent], snap)
     return Tree(
         base=root,
-        bodies=tuple(_finish(draft, columns) for draft in drafts),
+        bodies=tuple(_finish(draft, columns, snap) for draft in drafts),
         frames={
-            name: Frame(body=body, rotation=cs.DM(_snapped(rotation)), translation=cs.DM(_snapped(translation)))
+            name: Frame(
+                body=body, rotation=cs.DM(_snapped(rotation, snap)), translation=cs.DM(_snapped(translation, snap))
+            )
             for body, draft in enumerate(drafts)
             for name, (rotation, translation) in draft.frames.items()
         },
-        joints=tuple(by_name[name] for name in moving),
+        joints=tuple(_limited(by_name[name], followers, by_name) for name in moving),
+        followers=followers,
         locked=held,
         merged={name: draft.name for draft in drafts for name in draft.frames if name != draft.name},
         total_mass=float(sum(link.mass for link in links)),
@@ -133,38 +145,95 @@ def _check_names(by_name: Mapping[str, Joint], moving: Sequence[str], locked: Ma
         raise ModelError(f"joint both moving and locked: {listed(both)}")
 
 
-def _held(by_name: Mapping[str, Joint], moving: Sequence[str], locked: Mapping[str, float]) -> dict[str, float]:
-    """Return where every joint that could move but does not is held [rad or m]; refuse one that would have to move."""
-    values = {name: float(value) for name, value in locked.items()}
-    if wrong := [name for name, value in values.items() if not np.isfinite(value)]:
-        raise ModelError(f"joint '{wrong[0]}' is locked at {values[wrong[0]]}; expected a finite number")
+def independent(joints: Sequence[Joint], locked: Mapping[str, float]) -> list[str]:
+    """Return the joints that can move on their own: neither fixed nor locked, and mimics of no other."""
+    return [
+        joint.name for joint in joints if joint.kind != "fixed" and joint.mimic is None and joint.name not in locked
+    ]
+
+
+def _held_and_following(
+    by_name: Mapping[str, Joint], moving: Sequence[str], locked: Mapping[str, float]
+) -> tuple[dict[str, float], dict[str, Mimic]]:
+    """Return of the joints that could move but are not in `moving` where they are held, or how they follow one of it.
+
+    Mimic joints of mimic joints are put together: q = m (m' q' + o') + o. What leads to a joint that is locked, fixed,
+    or left out of `moving` is held.
+    """
+    stated = {name: float(value) for name, value in locked.items()}
+    if wrong := [name for name, value in stated.items() if not np.isfinite(value)]:
+        raise ModelError(f"joint '{wrong[0]}' is locked at {stated[wrong[0]]}; expected a finite number")
     for name in moving:
         if mimic := by_name[name].mimic:
             raise ModelError(
-                f"joint '{name}' mimics '{mimic.joint}' and cannot move on its own; leave both out of the joints that "
-                "move, or lock it"
+                f"joint '{name}' mimics '{mimic.joint}' and cannot move on its own; leave it out of the joints that "
+                "move, and it follows"
             )
 
-    moves = set(moving)
-    held = [name for name, joint in by_name.items() if joint.kind != "fixed" and name not in moves]
-    for name in held:
-        followers: dict[str, Mimic] = {}
-        leader = name
-        while leader not in values and (mimic := by_name[leader].mimic) is not None:
-            followers[leader] = mimic
-            if mimic.joint in followers or mimic.joint not in by_name:
-                raise ModelError(f"joint '{leader}' mimics '{mimic.joint}', which leads to no joint that could move it")
-            if mimic.joint in moves:
-                raise ModelError(
-                    f"joint '{leader}' mimics '{mimic.joint}', which moves; mimic joints are not supported: "
-                    f"leave '{mimic.joint}' out of the joints that move, or lock '{leader}'"
-                )
-            leader = mimic.joint
-        for follower, mimic in reversed(followers.items()):
-            values[follower] = mimic.multiplier * values.get(mimic.joint, 0.0) + mimic.offset
-    if far := [name for name in held if not abs(values.get(name, 0.0)) <= _FAR]:
-        raise ModelError(f"joint '{far[0]}' is held at {values[far[0]]:g}; expected at most {_FAR:g} in size")
-    return {name: values.get(name, 0.0) for name in held}
+    held: dict[str, float] = {}
+    followers: dict[str, Mimic] = {}
+    for name in (name for name, joint in by_name.items() if joint.kind != "fixed" and name not in moving):
+        how, passed = Mimic(joint=name), [name]
+        while how.joint not in moving and how.joint not in stated and (mimic := by_name[how.joint].mimic) is not None:
+            if by_name[how.joint].kind == "fixed":
+                break
+            _check_leader(passed, mimic.joint, by_name)
+            passed.append(mimic.joint)
+            how = Mimic(
+                joint=mimic.joint,
+                multiplier=how.multiplier * mimic.multiplier,
+                offset=how.multiplier * mimic.offset + how.offset,
+            )
+        _check_size(name, how)
+        if how.joint in moving and how.multiplier:
+            followers[name] = how
+        else:
+            held[name] = how.multiplier * stated.get(how.joint, 0.0) + how.offset
+            if not abs(held[name]) <= _FAR:
+                raise ModelError(f"joint '{name}' is held at {held[name]:g}; expected at most {_FAR:g} in size")
+    return held, followers
+
+
+def _check_leader(passed: Sequence[str], leader: str, by_name: Mapping[str, Joint]) -> None:
+    """Refuse a mimic joint, the last of `passed`, whose leader does not exist or has been passed on the way to it."""
+    if leader not in by_name:
+        movable = [name for name, joint in by_name.items() if joint.kind != "fixed"]
+        raise ModelError(f"joint '{passed[-1]}' mimics an {unknown('joint', leader, movable)}")
+    if leader in passed:
+        circle = passed[passed.index(leader) :]
+        if len(circle) == 1:
+            raise ModelError(f"joint '{leader}' mimics itself; expected another joint")
+        raise ModelError(f"the joints {listed(circle)} mimic each other in a circle; expected one that moves first")
+
+
+def _check_size(name: str, how: Mimic) -> None:
+    for what, number in (("multiplier", how.multiplier), ("offset", how.offset)):
+        if not abs(number) <= _FAR:
+            raise ModelError(f"joint '{name}' mimics '{how.joint}' by the {what} {number:g}; expected at most {_FAR:g}")
+
+
+def _limited(leader: Joint, followers: Mapping[str, Mimic], by_name: Mapping[str, Joint]) -> Joint:
+    """Return a joint with the limits that its followers keep as well.
+
+    Its range is what its own and theirs have in common: lower ≤ m q + o ≤ upper. With its speed q̇ they move at m q̇, so
+    each allows its own limit over |m|. Its torque τ gives a follower τ / m, so each allows its own limit times |m|, as
+    in a train of gears, where all of the load may be at one of them. Limits of speed and torque of zero or less stand
+    for none. Where the ranges have nothing in common, the joint keeps its own, and `inspection` says so.
+    """
+    lower, upper, velocity, effort = [leader.lower], [leader.upper], [leader.velocity], [leader.effort]
+    for name, how in followers.items():
+        if how.joint != leader.name:
+            continue
+        follower, size = by_name[name], abs(how.multiplier)
+        ends = sorted((end - how.offset) / how.multiplier for end in (follower.lower, follower.upper))
+        lower.append(ends[0])
+        upper.append(ends[1])
+        velocity += [follower.velocity / size] if follower.velocity > 0 else []
+        effort += [follower.effort * size] if follower.effort > 0 else []
+    low, high = max(lower), min(upper)
+    if low > high:
+        low, high = leader.lower, leader.upper
+    return replace(leader, lower=low, upper=high, velocity=min(velocity), effort=min(effort))
 
 
 def _check_masses(drafts: Sequence[_Draft]) -> None:
@@ -228,6 +297,8 @@ def _displaced(
         rotation: of the child's frame with the joint at zero, (3, 3).
         translation: of the child's frame with the joint at zero, (3,) [m].
     """
+    if value == 0:
+        return rotation, translation
     if joint.kind == "prismatic":
         return rotation, translation + rotation @ joint.axis * value
     skew = np.array(cs.skew(cs.DM(joint.axis)))
@@ -294,7 +365,7 @@ def _absorb_offset(draft: _Draft) -> None:
     draft.offset = float(offset)
 
 
-def _regroup(draft: _Draft, parent: _Draft) -> None:
+def _regroup(draft: _Draft, parent: _Draft, snap: float) -> None:
     """Hand to the parent the part of its child's inertia that moves as if it belonged to the parent."""
     assert draft.joint is not None
     whole = draft.inertia
@@ -306,25 +377,38 @@ def _regroup(draft: _Draft, parent: _Draft) -> None:
     draft.inertia = Inertia(
         whole.mass - given.mass, whole.first_moment - given.first_moment, whole.about_origin - given.about_origin
     )
-    parent.inertia += given.rotated(cs.DM(_snapped(draft.rotation))).shifted(cs.DM(draft.translation))
+    parent.inertia += given.rotated(cs.DM(_snapped(draft.rotation, snap))).shifted(cs.DM(draft.translation))
 
 
-def _snapped(values: np.ndarray) -> np.ndarray:
-    """Return the values with 0 and ±1 where they are meant."""
-    nearest = np.clip(np.round(values), -1, 1)
-    return np.where(np.abs(values - nearest) < _SNAP, nearest, values)
+def _snap(drafts: Sequence[_Draft]) -> float:
+    """Return how close to 0 or ±1 an entry is taken as meant: finer where some are about `_SNAP` away."""
+    entries = [values.ravel() for draft in drafts for values in (draft.rotation, draft.translation)]
+    entries += [values.ravel() for draft in drafts for pose in draft.frames.values() for values in pose]
+    away = np.concatenate([np.zeros(1), *(np.abs(values - _nearest(values)) for values in entries)])
+    return _FINE_SNAP if ((away >= _SNAP) & (away < 10 * _SNAP)).any() else _SNAP
 
 
-def _finish(draft: _Draft, columns: Mapping[str, int]) -> Body:
+def _nearest(values: np.ndarray) -> np.ndarray:
+    return np.clip(np.round(values), -1, 1)
+
+
+def _snapped(values: np.ndarray, snap: float) -> np.ndarray:
+    """Return the values with 0 and ±1 where they are closer than `snap`."""
+    nearest = _nearest(values)
+    return np.where(np.abs(values - nearest) < snap, nearest, values)
+
+
+def _finish(draft: _Draft, columns: Mapping[str, int], snap: float) -> Body:
     joint = draft.joint
     return Body(
         name=draft.name,
         parent=draft.parent,
         joint=None if joint is None else joint.name,
         prismatic=joint is not None and joint.kind == "prismatic",
-        column=-1 if joint is None else columns[joint.name],
-        rotation=cs.DM(_snapped(draft.rotation)),
-        translation=cs.DM(_snapped(draft.translation)),
+        column=-1 if draft.follows is None else columns[draft.follows.joint],
+        multiplier=1.0 if draft.follows is None else draft.follows.multiplier,
+        rotation=cs.DM(_snapped(draft.rotation, snap)),
+        translation=cs.DM(_snapped(draft.translation, snap)),
         offset=draft.offset,
         inertia=Inertia(
             float(draft.inertia.mass),

@@ -51,7 +51,7 @@ def inverse_dynamics(
         omega, alpha, acceleration = omegas[body.parent], alphas[body.parent], accelerations[body.parent]
         back = pose.rotation.T
         carried = acceleration + _turning(omega, alpha) @ pose.translation
-        rate, rate_change = s_dot[body.column], s_ddot[body.column]
+        rate, rate_change = body.joint_value(s_dot), body.joint_value(s_ddot)
         omega, alpha, acceleration = back @ omega, back @ alpha, back @ carried
         if body.prismatic:
             acceleration = acceleration + cs.vertcat(2 * omega[1] * rate, -2 * omega[0] * rate, rate_change)
@@ -75,7 +75,7 @@ def inverse_dynamics(
     torques = cs.SX(6 + len(tree.joints), 1)
     for index in range(len(tree.bodies) - 1, BASE, -1):
         body, pose = tree.bodies[index], poses[index]
-        torques[6 + body.column] = forces[index][2] if body.prismatic else moments[index][2]
+        torques[6 + body.column] += body.multiplier * (forces[index][2] if body.prismatic else moments[index][2])
         force = pose.rotation @ forces[index]
         forces[body.parent] = forces[body.parent] + force
         moments[body.parent] = moments[body.parent] + pose.rotation @ moments[index] + cs.cross(pose.translation, force)

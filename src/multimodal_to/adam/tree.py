@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import casadi as cs
 import numpy as np
 
-from multimodal_to.adam.spatial import Inertia
+from multimodal_to.adam.spatial import Array, Inertia
 from multimodal_to.errors import ModelError, unknown
 
 BASE = 0
@@ -28,11 +28,17 @@ class Link:
 
 @dataclass(frozen=True, kw_only=True)
 class Mimic:
-    """A joint that follows another: its position is `multiplier` times the other's plus `offset` [rad or m]."""
+    """How a joint follows another: its position is `multiplier` times that of `joint` plus `offset` [rad or m]."""
 
     joint: str
     multiplier: float = 1.0
     offset: float = 0.0
+
+    def __str__(self) -> str:
+        """Return the follower's position as a formula: `-2 leader + 0.1`."""
+        factor = "" if self.multiplier == 1 else f"{self.multiplier:g} "
+        added = "" if self.offset == 0 else f" {'-' if self.offset < 0 else '+'} {abs(self.offset):g}"
+        return f"{factor}{self.joint}{added}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,10 +72,15 @@ class Body:
     joint: str | None  # None for the base
     prismatic: bool
     column: int  # of s and of every joint-space quantity; −1 for the base
+    multiplier: float  # the joint moves by this times s[column]: 1, or what its mimic joint says
     rotation: cs.DM  # (3, 3)
     translation: cs.DM  # (3, 1) [m]
     offset: float  # added to the joint's angle [rad]
     inertia: Inertia
+
+    def joint_value(self, joints: cs.SX) -> cs.SX:
+        """Return what the body's own joint has of s, ṡ or s̈: multiplier · s[column]."""
+        return self.multiplier * joints[self.column]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +99,8 @@ class Tree:
     base: str
     bodies: tuple[Body, ...]
     frames: Mapping[str, Frame]
-    joints: tuple[Joint, ...]  # the moving ones, in the order of s
+    joints: tuple[Joint, ...]  # the moving ones, in the order of s, with limits that their followers keep as well
+    followers: Mapping[str, Mimic]  # mimic joints that move, each as it follows one of `joints`
     locked: Mapping[str, float]  # joints held still, with their values [rad or m]
     merged: Mapping[str, str]  # link without a moving joint of its own -> link that carries it
     total_mass: float  # [kg]
@@ -97,6 +109,38 @@ class Tree:
     def joint_names(self) -> tuple[str, ...]:
         """Return the names of the moving joints in the order of s."""
         return tuple(joint.name for joint in self.joints)
+
+    @property
+    def coupling(self) -> cs.DM:
+        """Return G, (bodies − 1, n): the joints of all bodies but the base move with G ṡ.
+
+        What belongs to those joints one by one is gathered by it: J G of a Jacobian, Gᵀ τ of torques, Gᵀ M G. Without
+        mimic joints it only orders them.
+        """
+        coupling = cs.DM(len(self.bodies) - 1, len(self.joints))
+        for row, body in enumerate(self.bodies[1:]):
+            coupling[row, body.column] = body.multiplier
+        return coupling
+
+    def joint_values(self, s: Array) -> dict[str, Array]:
+        """Return where every joint of the URDF that can move is: those of s, their followers, and the locked ones.
+
+        Args:
+            s: joint positions, (n,), or (n, count) for many [rad or m].
+        """
+        values = dict(zip(self.joint_names, s, strict=True))
+        values |= {name: how.multiplier * values[how.joint] + how.offset for name, how in self.followers.items()}
+        return values | {name: np.full(s.shape[1:], value) for name, value in self.locked.items()}
+
+    def joint_rates(self, s_dot: Array) -> dict[str, Array]:
+        """Return how fast every joint of the URDF that can move does, as `joint_values` says where it is.
+
+        Args:
+            s_dot: joint velocities, (n,), or (n, count) for many [rad/s or m/s].
+        """
+        rates = dict(zip(self.joint_names, s_dot, strict=True))
+        rates |= {name: how.multiplier * rates[how.joint] for name, how in self.followers.items()}
+        return rates | {name: np.zeros(s_dot.shape[1:]) for name in self.locked}
 
     def frame(self, name: str) -> Frame:
         """Return a frame by name.

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from multimodal_to.adam.lean_tree import build_tree
+from multimodal_to.adam.lean_tree import build_tree, independent
 from multimodal_to.adam.leftovers import refuse_leftovers, unread
 from multimodal_to.adam.tree import Joint, Link, Mimic, Tree
-from multimodal_to.errors import ModelError, listed, shortened
+from multimodal_to.errors import ModelError, listed, said, shortened
 from multimodal_to.files.numbers import numbers
 from multimodal_to.files.reading import read_bytes
 
@@ -49,7 +49,8 @@ def load_tree(
 
     Args:
         urdf: a path, or the XML text itself.
-        joint_names: the joints that move, in the order of s; by default all that can, in the order of the file.
+        joint_names: the joints that move on their own, in the order of s; by default all that can, in the order of the
+            file. A mimic joint follows its leader, and is none of them.
         locked: positions [rad or m] of joints that can move but are not in `joint_names`; zero where not given.
 
     Raises:
@@ -59,7 +60,7 @@ def load_tree(
     if isinstance(joint_names, str):
         raise ModelError(f"the joints that move are given as the text '{joint_names}'; expected a list of names")
     if joint_names is None:
-        joint_names = [joint.name for joint in joints if joint.kind != "fixed" and joint.name not in (locked or {})]
+        joint_names = independent(joints, locked or {})
     return build_tree(links, joints, joint_names, locked)
 
 
@@ -98,7 +99,7 @@ def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
             load_collision_meshes=False,
         ).robot
     except Exception as error:  # yourdfpy raises whatever its parsing runs into
-        raise ModelError(f"{source} is no URDF that can be read: {error}") from error
+        raise ModelError(f"{source} is no URDF that can be read: {said(error)}") from error
     finally:
         logger.setLevel(level)
 
@@ -134,7 +135,7 @@ def _root(urdf: str | os.PathLike[str]) -> tuple[Any, str]:
     except (etree.XMLSyntaxError, ValueError) as error:
         if b"<!DOCTYPE" in text:  # whose entities the parser has stumbled over
             raise ModelError(f"{source} {_ENTITIES}") from error
-        raise ModelError(f"{source} is not valid XML: {error}") from error
+        raise ModelError(f"{source} is not valid XML: {said(error)}") from error
     if root.getroottree().docinfo.internalDTD is not None:
         raise ModelError(f"{source} {_ENTITIES}")
     if root.tag != "robot":
@@ -299,8 +300,8 @@ def _joint(joint: Any) -> Joint:
 def _limits(joint: Any) -> tuple[dict[str, float], tuple[str, ...]]:
     """Return the limits with URDF's defaults, 0 for a range that is not written, and remarks on what is missing.
 
-    A continuous joint has no range. No <limit> at all means no limits, and so does a missing effort or velocity,
-    though URDF wants both.
+    A continuous joint has no range, and a mimic joint that states none has what its leader's leaves it. No <limit> at
+    all means no limits, and so does a missing effort or velocity, though URDF wants both.
     """
     if joint.type == "fixed":
         return {}, ()
@@ -308,7 +309,8 @@ def _limits(joint: Any) -> tuple[dict[str, float], tuple[str, ...]]:
         return {}, () if joint.type == "continuous" else ("has no <limit>, so no limits",)
     remarks = tuple(f"states no limit of {key}" for key in ("effort", "velocity") if getattr(joint.limit, key) is None)
     limits = {key: getattr(joint.limit, key) for key in ("effort", "velocity")}
-    if joint.type != "continuous":
+    bounded = joint.mimic is None or not (joint.limit.lower is joint.limit.upper is None)
+    if joint.type != "continuous" and bounded:
         limits |= {key: getattr(joint.limit, key) or 0.0 for key in ("lower", "upper")}
         if limits["lower"] > limits["upper"]:
             raise ModelError(

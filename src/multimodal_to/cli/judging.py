@@ -131,6 +131,8 @@ def simulate(
     writable(target.parent)
     playback = simulation.play(the_robot, plan, stabilise=stabilise, delay=delay, torque_limits=torque_limits)
     outcome = simulation.tracking(playback)
+    for note in playback.notes:
+        out.print(f"note: {note}", soft_wrap=True)
     for where, difference in agreement.items():
         out.print(
             f"inverse dynamics {where}: MuJoCo and RNEA differ by {difference:.1e} of the largest force", soft_wrap=True

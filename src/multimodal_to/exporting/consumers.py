@@ -6,7 +6,7 @@ by name, in the order of bytes (urdfdom keeps them so), and MuJoCo in the order 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from multimodal_to.adam import KinDynComputations
 from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.tree import Joint
 from multimodal_to.adam.urdf import read_urdf
-from multimodal_to.errors import OutputError
+from multimodal_to.errors import OutputError, listed
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import joint_torques, sampled
@@ -55,7 +55,8 @@ class WholeMotion:
 def whole_motion(robot: Robot, trajectory: Trajectory, order: Order) -> WholeMotion:
     """Return a motion of all joints of the robot's URDF: those that the robot does not move are where it holds them.
 
-    A joint that mimics another follows it. Their torques are what it takes to hold them there.
+    A joint that mimics another follows it. Torques are those of joints that move one by one, as in the other program's
+    model: what it takes to hold those that stand still, and to move a follower without its leader.
 
     Args:
         robot: the robot of the trajectory.
@@ -70,17 +71,16 @@ def whole_motion(robot: Robot, trajectory: Trajectory, order: Order) -> WholeMot
     _, joints = read_urdf(robot.urdf)
     moving = tuple(_depth_first(joints, robot.kindyn.tree.base, order))
     by_joint = {joint.name: joint for joint in moving}
-    if missing := [name for name in robot.joint_names if name not in by_joint]:
-        raise OutputError(f"'{robot.urdf}' no longer has the joint '{missing[0]}' of {robot.name}")
-    held, at_knots = robot.kindyn.tree.locked, sampled(trajectory)
-    positions = np.array([_row(joint, by_joint, held, at_knots, "joint_positions") for joint in moving])
-    velocities = np.array([_row(joint, by_joint, held, at_knots, "joint_velocities") for joint in moving])
-    shape = len(moving), trajectory.time.size
+    tree = robot.kindyn.tree
+    if changed := {*tree.joint_names, *tree.followers, *tree.locked} ^ set(by_joint):
+        raise OutputError(f"'{robot.urdf}' no longer has the joints of {robot.name}: {listed(sorted(changed))} changed")
+    names = tuple(by_joint)
+    positions, velocities = _of_all_joints(robot, sampled(trajectory), names)
     return WholeMotion(
         joints=moving,
-        positions=positions.reshape(shape),
-        velocities=velocities.reshape(shape),
-        torques=_torques(robot, trajectory, moving, by_joint),
+        positions=positions,
+        velocities=velocities,
+        torques=_torques(robot, trajectory, names),
     )
 
 
@@ -97,47 +97,37 @@ def _depth_first(joints: Sequence[Joint], base: str, order: Order) -> Iterator[J
         pending += sorted(below.get(joint.child, []), key=order)[::-1]
 
 
-def _row(
-    joint: Joint, by_joint: Mapping[str, Joint], held: Mapping[str, float], motion: Trajectory, name: str
-) -> Array:
-    """Return the positions or velocities of a joint, (knots + 1,).
+def _of_all_joints(robot: Robot, motion: Trajectory, names: Sequence[str]) -> tuple[Array, Array]:
+    """Return positions and velocities of joints, (joints, columns of the motion) each.
 
     Args:
-        joint: whose.
-        by_joint: all joints by name.
-        held: where joints that do not move are.
-        motion: of those that do.
-        name: "joint_positions" or "joint_velocities".
+        robot: which of them it moves, which follow others, and where it holds the rest.
+        motion: of the joints that it moves.
+        names: of joints that can move.
     """
-    is_position = name == "joint_positions"
-    if joint.name in motion.joint_names:
-        return np.asarray(getattr(motion, name)[motion.joint_names.index(joint.name)])
-    if joint.mimic is not None and joint.name not in held:
-        leader = _row(by_joint[joint.mimic.joint], by_joint, held, motion, name)
-        return joint.mimic.multiplier * leader + is_position * joint.mimic.offset
-    return np.full(motion.time.size, held.get(joint.name, 0.0) if is_position else 0.0)
+    tree = robot.kindyn.tree
+    found = []
+    for values in (tree.joint_values(motion.joint_positions), tree.joint_rates(motion.joint_velocities)):
+        found.append(np.array([values[name] for name in names]).reshape(len(names), motion.time.size))
+    return found[0], found[1]
 
 
-def _torques(robot: Robot, trajectory: Trajectory, moving: Sequence[Joint], by_joint: Mapping[str, Joint]) -> Array:
+def _torques(robot: Robot, trajectory: Trajectory, names: tuple[str, ...]) -> Array:
     """Return the torques of all joints by inverse dynamics [N m or N], (joints, knots + 1).
 
     Args:
         robot: the robot of the trajectory.
         trajectory: the motion.
-        moving: the joints in the order wanted.
-        by_joint: the same by name.
+        names: of the joints in the order wanted.
     """
     own = dict(zip(robot.joint_names, joint_torques(robot, trajectory), strict=True))
-    names = tuple(joint.name for joint in moving)
     if set(names) != set(own):
-        held = robot.kindyn.tree.locked
+        for how in robot.kindyn.tree.followers.values():
+            own.pop(how.joint, None)  # it moves its followers as well
         whole = replace(robot, kindyn=KinDynComputations(_without_mimics(robot), names, gravity=robot.gravity))
-        rows: dict[str, Any] = {
-            name: np.array([_row(joint, by_joint, held, trajectory, name) for joint in moving])
-            for name in ("joint_positions", "joint_velocities")
-        }
-        others = joint_torques(whole, replace(trajectory, joint_names=names, **rows))
-        own = dict(zip(names, others, strict=True)) | own
+        positions, velocities = _of_all_joints(robot, trajectory, names)
+        motion = replace(trajectory, joint_names=names, joint_positions=positions, joint_velocities=velocities)
+        own = dict(zip(names, joint_torques(whole, motion), strict=True)) | own
     return np.array([own[name] for name in names]).reshape(len(names), trajectory.time.size)
 
 

@@ -36,7 +36,7 @@ CONVENTIONS = (
 def columns(robot: Robot, trajectory: Trajectory) -> dict[str, tuple[str, Array]]:
     """Return every row of every quantity by name, as ``joint_positions.l_knee``, with its unit and values.
 
-    The last ones are the joint torques, which follow from the motion.
+    The last ones are the joint torques, which follow from the motion, and mimic joints, which follow others.
 
     Args:
         robot: the robot of the trajectory, for the torques.
@@ -54,7 +54,29 @@ def columns(robot: Robot, trajectory: Trajectory) -> dict[str, tuple[str, Array]
     names = row_labels(trajectory, JOINT_TORQUES.of, JOINT_TORQUES.axes)
     for joint, unit, values in zip(names, row_units(JOINT_TORQUES, robot), torques, strict=True):
         table[f"joint_torques.{joint}"] = (unit, values)
+    slides = {body.joint: body.prismatic for body in robot.kindyn.tree.bodies}
+    for what, of_all in _followers(robot, trajectory).items():
+        for joint, values in zip(robot.kindyn.tree.followers, of_all, strict=True):
+            unit = ("m" if slides[joint] else "rad") + "/s" * (what == "follower_velocities")
+            table[f"{what}.{joint}"] = (unit, values)
     return table
+
+
+def _followers(robot: Robot, trajectory: Trajectory) -> dict[str, Array]:
+    """Return positions and velocities of the mimic joints that move, (followers, knots + 1); nothing without any.
+
+    Args:
+        robot: whose joints follow others.
+        trajectory: its motion, sampled at the knots.
+    """
+    tree = robot.kindyn.tree
+    if not tree.followers:
+        return {}
+    positions, rates = tree.joint_values(trajectory.joint_positions), tree.joint_rates(trajectory.joint_velocities)
+    return {
+        "follower_positions": np.array([positions[name] for name in tree.followers]),
+        "follower_velocities": np.array([rates[name] for name in tree.followers]),
+    }
 
 
 def write_csv(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
@@ -79,6 +101,8 @@ def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
     """Write a MATLAB file (version 5): every quantity and the joint torques, (rows, knots + 1), names, units.
 
     Names are cells; units are a struct, with one text for a quantity or, where joints differ, a cell for each of them.
+    Mimic joints, if there are any, are `follower_positions` and `follower_velocities`, in the order of
+    `follower_names`.
 
     Args:
         robot: the robot of the trajectory, for the torques.
@@ -93,6 +117,7 @@ def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
     except ImportError as error:
         raise OutputError("MATLAB files need SciPy: pip install 'multimodal-to[mat]'") from error
     torques, trajectory = joint_torques(robot, trajectory), sampled(trajectory)
+    followers = robot.kindyn.tree.followers
     content = {
         "robot": trajectory.robot,
         "scenario": trajectory.scenario,
@@ -105,6 +130,8 @@ def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
         **{name: np.array(getattr(trajectory, name), dtype=object) for name in _NAMES},
         **{name: getattr(trajectory, name) for name in QUANTITIES},
         "joint_torques": torques,
+        **_followers(robot, trajectory),
+        **({"follower_names": np.array(tuple(followers), dtype=object)} if followers else {}),
     }
     with whole_file(path) as draft:
         savemat(draft, content, oned_as="row", long_field_names=True)

@@ -302,11 +302,22 @@ def _refuse_repeated(kind: str, names: Sequence[str]) -> None:
 
 
 def _limits(file: RobotFile, kindyn: KinDynComputations) -> JointLimits:
-    joints = file.joints.values()
+    """Return what the file says to plan in; of joints that others follow, cut to what the followers allow."""
+    joints, tree = tuple(file.joints.values()), kindyn.tree
+    lower, upper, speed = (np.array([getattr(joint, key) for joint in joints]) for key in ("lower", "upper", "speed"))
+    for index in sorted({tree.joint_names.index(how.joint) for how in tree.followers.values()}):
+        allowed, home = tree.joints[index], joints[index].home
+        lower[index], upper[index] = max(lower[index], allowed.lower), min(upper[index], allowed.upper)
+        speed[index] = min(speed[index], allowed.velocity) if allowed.velocity > 0 else speed[index]
+        if not lower[index] <= home <= upper[index]:
+            raise ModelError(
+                f"home {home:g} of '{allowed.name}' is not within {lower[index]:g} to {upper[index]:g}, the range in "
+                "which its mimic joints keep theirs"
+            )
     return JointLimits(
-        lower=np.array([joint.lower for joint in joints]),
-        upper=np.array([joint.upper for joint in joints]),
-        speed=np.array([joint.speed for joint in joints]),
+        lower=lower,
+        upper=upper,
+        speed=speed,
         effort=np.array(
             [_effort(joint, stated.effort) for joint, stated in zip(joints, kindyn.tree.joints, strict=True)]
         ),

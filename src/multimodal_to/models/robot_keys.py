@@ -176,7 +176,8 @@ class RobotFile:
     urdf: str
     """Path of the URDF, from the robot's folder and inside it."""
     joints: Mapping[str, JointTable]
-    """The joints that move, by their names in the URDF, in the order of s; all others stay at zero."""
+    """The joints that move, by their names in the URDF, in the order of s. Mimic joints follow; all others stay at
+    zero."""
     joint_groups: Mapping[str, tuple[str, ...]]
     """Names for sets of joints, which weights of a scenario refer to."""
     home: HomeTable

@@ -17,7 +17,7 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import SX, Array
-from multimodal_to.errors import FormulationError, MultimodalError, listed, shown
+from multimodal_to.errors import FormulationError, MultimodalError, listed, said, shown
 from multimodal_to.models.joint_units import either, joint_units
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
@@ -297,7 +297,7 @@ def _asked(name: str, what: str, function: Callable[[Parameters], Any], paramete
     except MultimodalError:
         raise
     except Exception as error:  # a user's own function may fail in any way; its own words say how
-        raise FormulationError(f"the term '{name}': its {what} fails: {type(error).__name__}: {error}") from error
+        raise FormulationError(f"the term '{name}': its {what} fails: {type(error).__name__}: {said(error)}") from error
 
 
 def _evaluated(name: str, function: Callable[..., SX], at: Knot | Interval, parameters: Parameters) -> SX:
@@ -307,7 +307,7 @@ def _evaluated(name: str, function: Callable[..., SX], at: Knot | Interval, para
     except MultimodalError as error:
         raise FormulationError(f"the term '{name}': {error}") from error
     except Exception as error:  # a user's own function may fail in any way; its own words say how
-        raise FormulationError(f"the term '{name}' fails: {type(error).__name__}: {error}") from error
+        raise FormulationError(f"the term '{name}' fails: {type(error).__name__}: {said(error)}") from error
     try:
         column = cs.SX(value)
     except Exception as error:  # CasADi has no type of its own for this

@@ -18,7 +18,7 @@ from typing import Any
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
-from multimodal_to.errors import OutputError
+from multimodal_to.errors import OutputError, said
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 """Programs that are looked for, in this order, where the environment's CHROME_PATH names none."""
@@ -148,7 +148,7 @@ def open_browser(size: tuple[int, int]) -> Iterator[Page]:
                 )
                 yield page
         except (WebSocketException, TimeoutError, ConnectionError) as error:
-            raise OutputError(f"the browser '{program}' stopped answering: {error}") from error
+            raise OutputError(f"the browser '{program}' stopped answering: {said(error)}") from error
         finally:
             process.terminate()
             try:

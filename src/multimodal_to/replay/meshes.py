@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import MultimodalError
+from multimodal_to.errors import MultimodalError, said
 
 ROOT_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH")
 """Environment variables that list folders in which packages of meshes lie."""
@@ -71,7 +71,7 @@ def load_parts(uri: str, urdf: Path, scale: Array) -> list[Part]:
     try:
         meshes = [mesh for mesh in trimesh.load_scene(file).dump() if isinstance(mesh, trimesh.Trimesh)]
     except Exception as error:  # readers of a dozen formats raise whatever they run into
-        raise _UnusableError(f"no mesh that can be read: {error}") from error
+        raise _UnusableError(f"no mesh that can be read: {said(error)}") from error
     if not meshes:
         raise _UnusableError("no triangles that can be read")
     return [Part(vertices=mesh.vertices * scale, faces=np.asarray(mesh.faces), rgba=_colour(mesh)) for mesh in meshes]

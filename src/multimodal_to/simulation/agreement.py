@@ -76,10 +76,10 @@ def by_mujoco(simulation: SimulationModel, states: States) -> Array:
         mujoco.mj_kinematics(simulation.model, data)
         turn = data.xmat[1].reshape(3, 3)  # of the base, which is the first body after the world
         data.qacc[:3], data.qacc[3:6] = acceleration[:3], turn.T @ acceleration[3:6]
-        data.qacc[simulation.joint_velocities] = acceleration[6:]
+        data.qacc[6:] = (simulation.coupling @ acceleration[6:])[6:]
         mujoco.mj_inverse(simulation.model, data)
         force = data.qfrc_inverse
-        forces[:, column] = np.concatenate([force[:3], turn @ force[3:6], force[simulation.joint_velocities]])
+        forces[:, column] = np.concatenate([force[:3], turn @ force[3:6], simulation.coupling.T @ force])
     return forces
 
 

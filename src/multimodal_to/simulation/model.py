@@ -1,24 +1,26 @@
 """A robot and its ground as a MuJoCo model, from the same URDF reader: same masses, inertias, frames and friction.
 
-Every link is a body; only the joints that the plan moves are joints, the others are held where the robot holds them.
+Every link is a body. Joints are those that the plan moves, and the mimic joints that follow them, each held to its
+leader by an equality constraint; the others are held where the robot holds them.
 Feet are points: a small sphere at each contact point, on a ground that lies one radius deeper, so that a point touches
 where d(p) = 0. Nothing else of the robot touches anything.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
+import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
-from multimodal_to.adam.spatial import Array
-from multimodal_to.adam.tree import Joint, Link
+from multimodal_to.adam.spatial import Array, Inertia
+from multimodal_to.adam.tree import Joint, Link, Tree
 from multimodal_to.adam.urdf import read_urdf
-from multimodal_to.errors import ModelError, OutputError
+from multimodal_to.errors import ModelError, OutputError, listed, said
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Plane, Surface, frame_function, heights_below
 
@@ -30,6 +32,13 @@ STIFFNESS = 300.0
 """K of each joint's servo, τ = K (target − s) − D ṡ, within the effort limit of the joint [N m/rad]."""
 DAMPING = 10.0
 """D of each joint's servo [N m s/rad]; MuJoCo integrates it implicitly."""
+COUPLING_TIME = 2.0 * TIME_STEP
+"""Time constant of what holds a follower to its leader, critically damped [s]: the shortest that a step allows."""
+COUPLING_STRENGTH = 0.9999
+"""Share of the error that the coupling takes on itself [1]; the rest gives way."""
+SMALLEST_INERTIA = 1e-14
+"""MuJoCo takes no body with a smaller principal inertia [kg m²]."""
+_ROUNDING = 1e-9
 CELL = 0.02  # of the grid on which ground that is no plane is sampled [m]
 DEPTH = 1.0  # of the ground below its lowest point [m]
 
@@ -60,8 +69,10 @@ class SimulationModel:
     model: Any  # mujoco.MjModel
     joint_positions: NDArray[np.int64]  # of s in qpos, (n,)
     joint_velocities: NDArray[np.int64]  # of ṡ in qvel, (n,)
+    coupling: Array  # G: the joints in qvel move with G ṡ, followers too; forces on them are Gᵀ f for s, (nv, n)
     points: NDArray[np.int64]  # geom of each contact point, (contacts,)
     jets: NDArray[np.int64]  # site of each jet, (jets,)
+    notes: tuple[str, ...]  # what differs from the URDF, a sentence each
 
     def set_state(
         self,
@@ -84,10 +95,15 @@ class SimulationModel:
         """
         turn = np.zeros(9)
         data.qpos[:3], data.qpos[3:7] = position, quaternion_xyzw[[3, 0, 1, 2]] / np.linalg.norm(quaternion_xyzw)
-        data.qpos[self.joint_positions] = joints
+        for name, value in self._moving(self.robot.kindyn.tree.joint_values(joints)).items():
+            data.qpos[self.model.joint(name).qposadr[0]] = value
         mujoco_module().mju_quat2Mat(turn, data.qpos[3:7])
         data.qvel[:3], data.qvel[3:6] = velocity[:3], turn.reshape(3, 3).T @ velocity[3:]
-        data.qvel[self.joint_velocities] = joint_velocities
+        data.qvel[6:] = (self.coupling @ joint_velocities)[6:]
+
+    def _moving(self, values: Mapping[str, Array]) -> dict[str, Array]:
+        tree = self.robot.kindyn.tree
+        return {name: values[name] for name in (*tree.joint_names, *tree.followers)}
 
 
 def build_model(
@@ -123,7 +139,8 @@ def build_model(
     spec.compiler.boundmass = spec.compiler.boundinertia = 0.0  # keep what the URDF says
     spec.compiler.balanceinertia = False
     spec.compiler.discardvisual = spec.compiler.fusestatic = False
-    _add_bodies(mujoco, spec, robot)
+    notes = _add_bodies(mujoco, spec, robot)
+    _add_couplings(mujoco, spec, robot)
     mu = robot.friction if friction is None else friction
     for name in robot.contact_names:
         spec.body(name).add_geom(
@@ -143,14 +160,16 @@ def build_model(
     try:
         model = spec.compile()
     except ValueError as error:
-        raise ModelError(f"MuJoCo refuses '{robot.urdf}': {error}") from error
+        raise ModelError(f"MuJoCo refuses '{robot.urdf}': {said(error)}") from error
     return SimulationModel(
         robot=robot,
         model=model,
         joint_positions=_integers(model.joint(name).qposadr[0] for name in robot.joint_names),
         joint_velocities=_integers(model.joint(name).dofadr[0] for name in robot.joint_names),
+        coupling=_coupling(model, robot),
         points=_integers(model.geom(name).id for name in robot.contact_names),
         jets=_integers(model.site(name).id for name in robot.jet_names),
+        notes=notes,
     )
 
 
@@ -158,11 +177,36 @@ def _integers(values: Iterable[int]) -> NDArray[np.int64]:
     return np.array(list(values), dtype=np.int64)
 
 
-def _add_bodies(mujoco: ModuleType, spec: Any, robot: Robot) -> None:
-    """Add every link, parents first, and the joints that move in the order of s."""
+def _coupling(model: Any, robot: Robot) -> Array:
+    """Return G, (nv, n): how fast each of MuJoCo's velocities is for a unit of each joint of s."""
+    tree, coupling = robot.kindyn.tree, np.zeros((model.nv, len(robot.joint_names)))
+    for column, name in enumerate(robot.joint_names):
+        coupling[model.joint(name).dofadr[0], column] = 1.0
+    for name, how in tree.followers.items():
+        coupling[model.joint(name).dofadr[0], robot.joint_names.index(how.joint)] = how.multiplier
+    return coupling
+
+
+def _add_couplings(mujoco: ModuleType, spec: Any, robot: Robot) -> None:
+    """Hold every follower to its leader: q = offset + multiplier · q_leader."""
+    for name, how in robot.kindyn.tree.followers.items():
+        held = spec.add_equality(
+            name=name,
+            type=mujoco.mjtEq.mjEQ_JOINT,
+            objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            name1=name,
+            name2=how.joint,
+            solref=[COUPLING_TIME, 1.0],
+            solimp=[COUPLING_STRENGTH, COUPLING_STRENGTH, 1e-3, 0.5, 2.0],
+        )
+        held.data = [how.offset, how.multiplier, *np.zeros(len(held.data) - 2)]  # more numbers in newer versions
+
+
+def _add_bodies(mujoco: ModuleType, spec: Any, robot: Robot) -> tuple[str, ...]:
+    """Add every link, parents first, and the joints that move; return what was merged, a sentence each."""
     links, joints = read_urdf(robot.urdf)
     tree = robot.kindyn.tree
-    by_name = {link.name: link for link in links}
+    by_name, notes = _merged(tree, links)
     below: dict[str, list[Joint]] = {}
     for joint in joints:
         below.setdefault(joint.parent, []).append(joint)
@@ -174,12 +218,66 @@ def _add_bodies(mujoco: ModuleType, spec: Any, robot: Robot) -> None:
         _set_inertia(body, by_name[name])
         for joint in reversed(below.get(name, [])):
             child = body.add_body(name=joint.child, pos=joint.translation, quat=_quaternion(mujoco, joint.rotation))
-            if joint.name in tree.joint_names:
+            if joint.name in tree.joint_names or joint.name in tree.followers:
                 kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
                 child.add_joint(name=joint.name, type=kind, axis=joint.axis)
             elif joint.kind != "fixed":
                 _hold(mujoco, child, joint, tree.locked[joint.name])
             pending.append((joint.child, child))
+    return notes
+
+
+def _merged(tree: Tree, links: Sequence[Link]) -> tuple[dict[str, Link], tuple[str, ...]]:
+    """Return the links by name, merged where MuJoCo would refuse one, and a note on each that it would.
+
+    All links that move together are then one, as in `tree`, at the one whose joint moves them.
+    """
+    by_name = {link.name: link for link in links}
+    groups: dict[str, list[Link]] = {}
+    for link in links:
+        groups.setdefault(tree.merged.get(link.name, link.name), []).append(link)
+    notes = []
+    for carrier, group in groups.items():
+        massive = [link for link in group if link.mass > 0 or link.inertia.any()]
+        refused = [link for link in massive if not _is_body(link, moves=link.name == carrier)]
+        if not refused or len(massive) < 2:
+            continue
+        by_name |= {link.name: Link(name=link.name) for link in group} | {carrier: _sum(tree, carrier, massive)}
+        for link in refused:
+            others = listed(other.name for other in massive if other is not link)
+            notes.append(
+                f"MuJoCo takes no body like the link '{link.name}' ({link.mass:g} kg) by itself; it is merged with "
+                f"{others}, which move with it"
+            )
+    return by_name, tuple(notes)
+
+
+def _is_body(link: Link, *, moves: bool) -> bool:
+    """Return whether MuJoCo takes a link by itself; it also takes point masses that are fixed to what moves."""
+    if not link.inertia.any():
+        return not moves
+    smallest, middle, largest = np.linalg.eigvalsh(link.inertia)
+    return bool(smallest > SMALLEST_INERTIA and smallest + middle >= largest * (1.0 + _ROUNDING))
+
+
+def _sum(tree: Tree, carrier: str, links: Sequence[Link]) -> Link:
+    """Return links that move together as one in the frame of `carrier`.
+
+    Args:
+        tree: in which they do.
+        carrier: the link whose frame the sum is in.
+        links: of one body of the tree.
+    """
+    base = tree.frame(carrier)
+    total = Inertia.zero()
+    for link in links:
+        frame = tree.frame(link.name)
+        own = Inertia(link.mass, cs.DM.zeros(3, 1), cs.DM(link.inertia)).shifted(cs.DM(link.com))
+        in_body = own.rotated(frame.rotation).shifted(frame.translation)
+        total += in_body.shifted(-base.translation).rotated(base.rotation.T)
+    mass, com = float(total.mass), np.array(total.first_moment).ravel() / float(total.mass)
+    about_com = np.array(total.about_origin) - mass * (com @ com * np.eye(3) - np.outer(com, com))
+    return Link(name=carrier, mass=mass, com=com, inertia=about_com)
 
 
 def _set_inertia(body: Any, link: Link) -> None:

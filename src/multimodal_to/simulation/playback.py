@@ -55,6 +55,7 @@ class Playback:
     torques: Array  # that the joints' motors give at a step's start, after the clip [N m or N], (steps, n)
     asked_torques: Array  # that the controller asks of them, before the clip [N m or N], (steps, n)
     torque_limits: bool  # the clip was at the joints' effort limits; else there was none
+    notes: tuple[str, ...]  # where MuJoCo's model differs from the URDF, a sentence each
     fell: float | None  # when [s]
 
 
@@ -152,6 +153,7 @@ class _Player:
             time=self._time,
             fell=fell,
             torque_limits=self._torque_limits,
+            notes=self._simulation.notes,
             **{name: np.array([row[name] for row in rows]) for name in rows[0]},
         )
 
@@ -226,7 +228,7 @@ class _Player:
             if force.any():
                 self._mujoco.mj_jacGeom(simulation.model, data, jacobian, None, simulation.points[index])
                 total += jacobian.T @ force
-        return np.asarray(total[simulation.joint_velocities])
+        return np.asarray(simulation.coupling.T @ total)
 
     def _torques(self) -> Array:
         """Return what MuJoCo let the joints' motors give, (n,): what was asked, within their limits."""

@@ -260,7 +260,7 @@ def _effect_of_joints(simulation: SimulationModel, data: Any, origin: Array, thr
         moves |= angular.any(axis=0)
     if stands:
         effect[3:] -= _skew(simulation.robot.mass * simulation.robot.gravity) @ of_com
-    return np.asarray((effect * moves)[:, simulation.joint_velocities])
+    return np.asarray((effect * moves) @ simulation.coupling)
 
 
 def _ridge(matrix: Array, target: Array, spread: Array, weights: Array) -> Array:

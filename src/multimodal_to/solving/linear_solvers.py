@@ -14,7 +14,7 @@ from typing import Any
 import casadi as cs
 
 from multimodal_to import native
-from multimodal_to.errors import InputError, SolverError, unknown
+from multimodal_to.errors import InputError, SolverError, said, unknown
 
 AUTO = "auto"
 """`STAGES` where the native library is, else the first of `_PREFERRED` that works, and MUMPS where none does."""
@@ -180,7 +180,7 @@ def _trial(name: str, library: str) -> str:
     except subprocess.TimeoutExpired:
         return f"a trial of it did not end within {_PATIENCE:g} s"
     except (OSError, ValueError) as error:
-        return f"a trial of it did not start ({error})"
+        return f"a trial of it did not start ({said(error)})"
     if ended < 0:
         return f"a trial of it crashed with signal {-ended}"
     return "a trial of it failed" if ended else ""

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import TrajectoryError, shown
+from multimodal_to.errors import TrajectoryError, said, shown
 
 LARGEST_ARCHIVE = 32_000_000
 """The largest `.npz` that is read [byte] ..."""
@@ -47,7 +47,7 @@ def read_archive(source: Path) -> dict[str, np.ndarray]:
     except TrajectoryError:
         raise
     except Exception as error:  # a broken archive takes zipfile, its unpackers and numpy to a dozen kinds of errors
-        raise TrajectoryError(f"'{source}' is not a trajectory file of this library: {error}") from error
+        raise TrajectoryError(f"'{source}' is not a trajectory file of this library: {said(error)}") from error
 
 
 def _check_directory(archive: zipfile.ZipFile, source: Path) -> None:
