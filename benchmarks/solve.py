@@ -1,13 +1,15 @@
 """Time bundled scenarios, each run in a process of its own: a Markdown table of medians.
 
-    python benchmarks/solve.py [SCENARIO ...] [--runs 3] [--tight] [--reference short|full [--reference-of NAME ...]]
-                               [--growth] [--into PAGE]
+    python benchmarks/solve.py [SCENARIO ...] [--runs 3] [--executable] [--without-native] [--tight]
+                               [--reference short|full [--reference-of NAME ...]] [--growth] [--into PAGE]
 
 A scenario is the name of a bundled one or a TOML file. A run solves it as the command line does without pictures, in a
 process of its own, and then from Python: built, solved from its plain start guess, and solved again from that answer
 for a target that is 2 cm higher: the height at mid-horizon where the scenario asks for one, otherwise that of the end.
 How an iteration's time is split is that of the last phase, the exact one.
 
+* `--executable` takes the default problem, of plans that the robot carries out, in place of the paper's.
+* `--without-native` measures everything once more without the native library: CasADi's functions and MUMPS.
 * `--tight` goes on from an answer with a hundredth of the tolerance: how far its objective is above the converged one.
 * `--reference` runs `paper_reference.py` too, for the scenarios that it has or those of `--reference-of`: `full` to its
   end, which takes up to half an hour each and compares whole times; `short` for some iterations, which compares
@@ -36,6 +38,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import multimodal_to as mt
 from multimodal_to.scenarios.files import load
@@ -47,7 +50,7 @@ GRIDS = (35, 70, 140, 280)  # knots of --growth
 GROWTH_ITERATIONS = 40  # of --growth, half of them rough
 REFERENCE = Path(__file__).with_name("paper_reference.py")
 REFERENCES = ("take-off", "walk-to-fly", "jump")  # that it has
-BEGIN, END = "<!-- solve: begin -->", "<!-- solve: end -->"
+MARKS = "<!-- solve: {} -->", "<!-- solve executable: {} -->"  # on the page: of the paper's problem, of the default one
 UNKNOWN = "–"
 
 Figures = dict[str, Any]
@@ -60,9 +63,27 @@ KINDS = {
 """Kinds of work in an iteration, as CasADi names their times; the rest is IPOPT's own and its linear algebra."""
 
 
+EXECUTABLE, NATIVE = "MULTIMODAL_TO_BENCHMARK_EXECUTABLE", "MULTIMODAL_TO_NATIVE"
+"""Environment variables that the processes of the runs inherit."""
+WITHOUT = ("command, cold [s]", "first solve [s]", "iterations", "iteration, whole [ms]", "objective", "warm solve [s]")
+"""What a table shows of the runs without the native library."""
+
+
+def executable() -> bool:
+    """Return whether the default problem is measured, and not the paper's."""
+    return bool(os.environ.get(EXECUTABLE))
+
+
+def formulation() -> mt.Formulation:
+    """Return the formulation that is measured."""
+    return mt.Formulation.executable() if executable() else mt.Formulation.paper()
+
+
 def scenario_of(name: str) -> mt.Scenario:
     """Return a bundled scenario, or that of a TOML file."""
-    return load(name) if name.endswith(".toml") else mt.scenarios.paper(name)
+    if name.endswith(".toml"):
+        return load(name)
+    return mt.scenarios.find(name) if executable() else mt.scenarios.paper(name)
 
 
 def higher(scenario: mt.Scenario) -> mt.Scenario:
@@ -91,6 +112,7 @@ def command(name: str) -> Figures:
     """Run the whole command without pictures; it must end with an answer."""
     with tempfile.TemporaryDirectory() as folder:
         arguments = ["solve", name, "--quiet", "--no-pictures", "--output", folder]
+        arguments += [] if executable() else ["--paper"]
         started = time.perf_counter()
         ended = subprocess.run([sys.executable, "-m", "multimodal_to", *arguments], check=False)
         spent = time.perf_counter() - started
@@ -103,11 +125,11 @@ def library(name: str) -> Figures:
     """Build, solve and solve again from the answer, in this process."""
     robot, scenario = mt.load_robot("ironcub"), scenario_of(name)
     started = time.perf_counter()
-    problem = mt.build(robot, scenario, mt.Formulation.paper())
+    problem = mt.build(robot, scenario, formulation())
     built = time.perf_counter() - started
     cold = mt.solve(problem)
     peak = peak_memory()
-    warm_problem = mt.build(robot, higher(scenario), mt.Formulation.paper())
+    warm_problem = mt.build(robot, higher(scenario), formulation())
     warm = mt.solve(warm_problem, start=cold.trajectory)
     return {
         "variables": problem.lower.size,
@@ -139,7 +161,7 @@ def judged(problem: mt.Problem, solution: mt.Solution) -> Figures:
 
 def tight(name: str) -> Figures:
     """Solve, go on from the answer with a smaller tolerance, and compare the objectives."""
-    problem = mt.build(mt.load_robot("ironcub"), scenario_of(name), mt.Formulation.paper())
+    problem = mt.build(mt.load_robot("ironcub"), scenario_of(name), formulation())
     default = mt.Ipopt()
     answer = mt.solve(problem, default)
     tighter = mt.solve(problem, replace(default, tolerance=TIGHTER * default.tolerance), start=answer.trajectory)
@@ -159,9 +181,9 @@ def on_grid(scenario: mt.Scenario, knots: int) -> mt.Scenario:
 
 def growth(knots: str) -> Figures:
     """Iterate the take-off on a grid of so many knots."""
-    scenario = on_grid(mt.scenarios.take_off(), int(knots))
+    scenario = on_grid(scenario_of("take-off"), int(knots))
     started = time.perf_counter()
-    problem = mt.build(mt.load_robot("ironcub"), scenario, mt.Formulation.paper())
+    problem = mt.build(mt.load_robot("ironcub"), scenario, formulation())
     built = time.perf_counter() - started
     solution = mt.solve(problem, mt.Ipopt(max_iterations=GROWTH_ITERATIONS))
     return {
@@ -215,9 +237,19 @@ def _median(values: Sequence[Any]) -> float | str:
     return float(statistics.median(values))
 
 
+def whole(name: str, runs: int) -> Figures:
+    """Return the figures of the whole command and of the library."""
+    return medians(alone(command, name, runs)) | medians(alone(library, name, runs))
+
+
 def measure(name: str, chosen: argparse.Namespace) -> Figures:
     """Return all that is asked for of a scenario."""
-    figures = medians(alone(command, name, chosen.runs)) | medians(alone(library, name, chosen.runs))
+    figures = whole(name, chosen.runs)
+    if chosen.without_native:
+        with patch.dict(os.environ, {NATIVE: "0"}):
+            plain = whole(name, chosen.runs)
+        figures |= {f"without the native library: {key}": plain[key] for key in WITHOUT}
+        figures["solver, times faster"] = plain["first solve [s]"] / figures["first solve [s]"]
     if chosen.tight:
         figures |= medians(alone(tight, name, 1))
     if chosen.reference and name in chosen.reference_of:
@@ -266,11 +298,12 @@ def this_machine() -> str:
 
 def put(page: Path, text: str) -> None:
     """Set the text between the marks of a page."""
-    before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)
-    _, mark, after = rest.partition(END)
+    begin, end = (MARKS[executable()].format(word) for word in ("begin", "end"))
+    before, _, rest = page.read_text(encoding="utf-8").partition(begin)
+    _, mark, after = rest.partition(end)
     if not mark:
-        raise SystemExit(f"{page} lacks the marks {BEGIN} and {END}")
-    page.write_text(f"{before}{BEGIN}\n{text}{END}{after}", encoding="utf-8")
+        raise SystemExit(f"{page} lacks the marks {begin} and {end}")
+    page.write_text(f"{before}{begin}\n{text}{end}{after}", encoding="utf-8")
 
 
 def main() -> None:
@@ -278,6 +311,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Time scenarios.")
     parser.add_argument("scenario", nargs="*", help="names or TOML files; without, the paper's four")
     parser.add_argument("--runs", type=int, default=3, help="of which medians are taken")
+    parser.add_argument("--executable", action="store_true", help="the default problem, not the paper's")
+    parser.add_argument("--without-native", action="store_true", help="once more without the native library")
     parser.add_argument("--tight", action="store_true", help="compare with the objective of a tighter solve")
     parser.add_argument("--reference", choices=("short", "full"), help="run the paper's transcription too")
     parser.add_argument("--reference-of", nargs="+", choices=REFERENCES, default=REFERENCES, help="for these only")
@@ -285,6 +320,8 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("results/solve.md"), help="file of the tables")
     parser.add_argument("--into", type=Path, metavar="PAGE", help="also set them between the marks of a page")
     chosen = parser.parse_args()
+    if chosen.executable:
+        os.environ[EXECUTABLE] = "1"
     names = chosen.scenario or ["take-off", "take-off-and-landing", "walk-to-fly", "jump"]
     titles = [scenario_of(name).name for name in names]  # a wrong name ends before anything is timed
     text = f"{this_machine()} Medians of {chosen.runs} runs.\n\n"
