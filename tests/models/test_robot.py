@@ -170,6 +170,22 @@ def test_a_broken_robot_file_says_what_is_wrong(folder, old, new, sentence):
     assert sentence in str(error.value)
 
 
+def test_the_urdf_may_be_a_link_and_may_not_say_that_it_lies_outside(folder, tmp_path):
+    """A workspace of colcon links each file, or the whole folder, to where it is written."""
+    workspace, table = tmp_path / "workspace", (folder / "robot.toml").read_text(encoding="utf-8")
+    workspace.mkdir()
+    for name in ("robot.toml", "ironcub.urdf"):
+        (workspace / name).symlink_to(folder / name)
+    assert load_robot(workspace).urdf == workspace / "ironcub.urdf"
+    (tmp_path / "whole").symlink_to(folder)
+    assert load_robot(tmp_path / "whole").mass == load_robot(folder).mass
+    for urdf in ("../workspace/ironcub.urdf", str(folder / "ironcub.urdf"), "a/../../ironcub.urdf", "..", "."):
+        (workspace / "robot.toml").unlink(missing_ok=True)
+        (workspace / "robot.toml").write_text(table.replace("ironcub.urdf", urdf, 1), encoding="utf-8")
+        with pytest.raises(ModelError, match="which is outside the robot's folder"):
+            load_robot(workspace)
+
+
 def test_an_unknown_robot_is_named_with_those_that_exist():
     with pytest.raises(ModelError, match="unknown robot 'ironcup'; did you mean 'ironcub'"):
         load_robot("ironcup")

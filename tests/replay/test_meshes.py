@@ -17,7 +17,7 @@ from multimodal_to.models.proportions import Gait
 from multimodal_to.models.robot import JointLimits, Posture, Robot
 from multimodal_to.replay import MeshWarning
 from multimodal_to.replay.dress import read_dress, zero_poses
-from multimodal_to.replay.meshes import Part, find_mesh, package_file, shaded
+from multimodal_to.replay.meshes import Part, find_mesh, load_parts, package_file, shaded
 from multimodal_to.replay.visuals import FACES, appearance
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 from multimodal_to.trajectory.derived import frame_poses
@@ -58,11 +58,137 @@ def urdf(folder: Path, *addresses: str, scale: str = "1 1 1") -> Path:
         "model://boxes/meshes/box.stl",
         "../meshes/box.stl",
         "package://boxes/urdf/../meshes/box.stl",
+        "package://boxes//meshes/box.stl",
+        "package://boxes/meshes//./box.stl",
+        "PACKAGE://boxes/meshes/box.stl",
+        "package://boxes\\meshes\\box.stl",
+        "package://boxes/meshes\\box.stl",
+        "..\\meshes\\box.stl",
+        "package://boxes/meshes/%62ox.stl",
+        "file://../meshes/box.stl",
+        "file:../meshes/box.stl",
     ],
 )
 def test_a_mesh_is_found_however_a_urdf_names_it(folder, address):
     assert find_mesh(address, urdf(folder)) == folder / "meshes" / "box.stl"
     assert find_mesh((folder / "meshes" / "box.stl").as_uri(), urdf(folder)) == folder / "meshes" / "box.stl"
+
+
+def test_a_mesh_with_an_absolute_address_is_found_wherever_it_is(folder, tmp_path):
+    mesh = tmp_path / "secret.stl"
+    for address in (mesh.as_uri(), f"file:{mesh}", f"file://localhost{mesh}", str(mesh), f"FILE://{mesh}"):
+        assert find_mesh(address, urdf(folder)) == mesh
+
+
+@pytest.mark.parametrize(
+    ("address", "sentence"),
+    [
+        ("gone.stl", "not found"),
+        ("package://boxes/gone.stl", "not found in the folder '{folder}'"),
+        ("package://crates/box.stl", "not found: no folder 'crates' holds the URDF, lies beside it or above"),
+        ("https://example.org/box.stl", "not found: an address of 'https://', and meshes are read from files"),
+        ("file:///etc/hostname", "not found as a mesh: no .stl"),
+        ("..\\..\\..\\secret.stl", "leaves the folder of its robot by '..'"),
+        ("file://../../../secret.stl", "leaves the folder of its robot by '..'"),
+        ("C:\\meshes\\box.stl", "not found"),
+    ],
+)
+def test_the_reason_why_a_mesh_is_not_found_is_true(folder, address, sentence):
+    with pytest.raises(MultimodalError) as caught:
+        find_mesh(address, urdf(folder))
+    assert str(caught.value).startswith(sentence.format(folder=folder))
+
+
+def test_links_are_followed_as_the_system_does(folder, tmp_path):
+    """A workspace that links each file, one that links the folder, and one that links the URDF alone."""
+    by_file, by_folder, alone = (tmp_path / name / "boxes" for name in ("by_file", "by_folder", "alone"))
+    description = urdf(folder)
+    for inside in ("urdf/robot.urdf", "meshes/box.stl", "package.xml"):
+        (by_file / inside).parent.mkdir(parents=True, exist_ok=True)
+        (by_file / inside).symlink_to(folder / inside)
+    by_folder.mkdir(parents=True)
+    (by_folder / "model").symlink_to(folder / "urdf")
+    (alone / "urdf").mkdir(parents=True)
+    (alone / "urdf" / "robot.urdf").symlink_to(description)
+    for link in (by_file / "urdf" / "robot.urdf", by_folder / "model" / "robot.urdf", alone / "urdf" / "robot.urdf"):
+        for address in ("../meshes/box.stl", "package://boxes/meshes/box.stl"):
+            assert find_mesh(address, link).samefile(folder / "meshes" / "box.stl")
+        with pytest.raises(MultimodalError, match="leaves the folder of its robot"):
+            find_mesh("../../../../secret.stl", link)
+
+
+# ---------------------------------------------------------------- Collada
+
+POINTS = "0 0 0 1 0 0 0 1 0 1 1 0"
+COLLADA = """<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit meter="1"/><up_axis>Z_UP</up_axis></asset>{materials}
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="12">{points}</float_array><technique_common>
+<accessor source="#a" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<{kind} count="{count}" material="m"><input semantic="VERTEX" source="#v" offset="0"/>{indices}</{kind}>
+</mesh></geometry></library_geometries>{scene}</COLLADA>"""
+SCENE = """<library_visual_scenes><visual_scene id="s"><node id="n"><matrix>1 0 0 0 0 1 0 0 0 0 1 5 0 0 0 1</matrix>
+<instance_geometry url="#g">{bound}</instance_geometry></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene>"""
+BOUND = """<bind_material><technique_common><instance_material symbol="m" target="#red"/></technique_common>
+</bind_material>"""
+RED = """<library_effects><effect id="e"><profile_COMMON><technique sid="c"><lambert><diffuse>{}</diffuse></lambert>
+</technique></profile_COMMON></effect></library_effects>
+<library_materials><material id="red"><instance_effect url="#e"/></material></library_materials>"""
+COLOUR, TEXTURE = "<color>1 0 0 1</color>", '<texture texture="gone-sampler" texcoord="UV"/>'
+KINDS = {
+    "triangles": (2, "<p>0 1 2 2 1 3</p>"),
+    "polylist": (1, "<vcount>4</vcount><p>0 1 3 2</p>"),
+    "polygons": (1, "<p>0 1 3 2</p>"),
+    "tristrips": (1, "<p>0 1 2 3</p>"),
+    "trifans": (1, "<p>0 1 3 2</p>"),
+}
+
+
+def square(folder, kind="triangles", *, scene=SCENE, bound="", materials=""):
+    """The parts of a unit square at z = 5, or at 0 without a scene."""
+    count, indices = KINDS[kind]
+    text = COLLADA.format(
+        kind=kind, count=count, indices=indices, points=POINTS, scene=scene.format(bound=bound), materials=materials
+    )
+    (folder / "meshes" / "square.dae").write_text(text)
+    return load_parts("../meshes/square.dae", urdf(folder), np.ones(3))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_collada_shape_is_read(folder, kind):
+    (part,) = square(folder, kind)
+    corners = part.vertices[part.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    np.testing.assert_allclose(normals, [[0, 0, 1], [0, 0, 1]])  # half the square each, and both seen from above
+    np.testing.assert_allclose(part.vertices[:, 2], 5)
+
+
+@pytest.mark.parametrize("materials", [RED.format(TEXTURE), RED.format(COLOUR).replace('url="#e"', 'url="#gone"'), ""])
+def test_a_material_that_cannot_be_made_costs_the_colour_and_not_the_shape(folder, materials):
+    (part,) = square(folder, bound=BOUND, materials=materials)
+    assert len(part.faces) == 2
+    (red,) = square(folder, bound=BOUND, materials=RED.format(COLOUR))
+    assert red.rgba == (1, 0, 0, 1)
+
+
+def test_a_collada_file_without_a_scene_shows_all_that_it_holds(folder):
+    (part,) = square(folder, scene="")
+    np.testing.assert_allclose(part.vertices[:, 2], 0)
+
+
+def test_the_feet_of_anymal_are_drawn_although_a_texture_is_missing():
+    """In three colours, of which one has a texture whose image the file does not declare."""
+    description = example_robots() / "anymal_b_simple_description" / "robots" / "anymal.urdf"
+    address = "package://example-robot-data/robots/anymal_b_simple_description/meshes/foot/anymal_foot.dae"
+    assert address in description.read_text(encoding="utf-8")
+    parts = load_parts(address, description, np.ones(3))
+    assert sum(len(part.faces) for part in parts) == 4604
+    assert len({part.rgba for part in parts}) == 3
+    appearance(description)  # warnings are errors
 
 
 def test_a_package_elsewhere_is_found_through_the_environment(folder, tmp_path, monkeypatch):

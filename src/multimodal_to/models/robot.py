@@ -253,8 +253,8 @@ def load_robot(robot: str | os.PathLike[str]) -> Robot:
 
 def _robot(file: RobotFile, folder: Path) -> Robot:
     urdf, joint_names = folder / file.urdf, tuple(file.joints)
-    if folder.resolve() not in urdf.resolve().parents:
-        raise ModelError(f"'urdf' is '{urdf}', which is outside the robot's folder")
+    if os.path.isabs(file.urdf) or Path(os.path.normpath(file.urdf)).parts[:1] in ((), ("..",)):  # a link may lead out
+        raise ModelError(f"'urdf' is '{file.urdf}', which is outside the robot's folder; expected a path inside it")
     kindyn = KinDynComputations(urdf, joint_names)
     _check_groups(file)
     contacts = tuple(

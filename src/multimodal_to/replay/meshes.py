@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ import trimesh
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import MultimodalError, said
+from multimodal_to.replay.collada import mended
 
 ROOT_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH")
 """Environment variables that list folders in which packages of meshes lie."""
@@ -25,7 +27,7 @@ LARGEST_MESH = 200_000_000
 """The largest mesh file that is read [byte]."""
 
 _POINTER = b"version https://git-lfs"
-_SCHEMES = ("package://", "model://")
+_SCHEMES = ("package", "model")
 
 
 class MeshWarning(UserWarning):
@@ -69,7 +71,8 @@ def load_parts(uri: str, urdf: Path, scale: Array) -> list[Part]:
     if size > LARGEST_MESH:
         raise _UnusableError(f"larger than {LARGEST_MESH / 1e6:g} MB")
     try:
-        meshes = [mesh for mesh in trimesh.load_scene(file).dump() if isinstance(mesh, trimesh.Trimesh)]
+        scene = _collada_scene(file) if file.suffix.lower() == ".dae" else trimesh.load_scene(file)
+        meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh)]
     except Exception as error:  # readers of a dozen formats raise whatever they run into
         raise _UnusableError(f"no mesh that can be read: {said(error)}") from error
     if not meshes:
@@ -77,39 +80,91 @@ def load_parts(uri: str, urdf: Path, scale: Array) -> list[Part]:
     return [Part(vertices=mesh.vertices * scale, faces=np.asarray(mesh.faces), rgba=_colour(mesh)) for mesh in meshes]
 
 
+def _collada_scene(file: Path) -> Any:
+    text = mended(file.read_bytes())
+    return trimesh.load_scene(io.BytesIO(text), file_type="dae", resolver=trimesh.resolvers.FilePathResolver(str(file)))
+
+
 def find_mesh(uri: str, urdf: Path) -> Path:
     """Return the file that a mesh's address in a URDF means.
 
     `package://NAME/PATH` and `model://NAME/PATH` mean PATH in the folder NAME: one that holds the URDF, or lies beside
     it or beside a folder above it, or in a folder of `ROOT_VARIABLES`, or in the installed example-robot-data. Any
-    other path is relative to the URDF, or absolute. No path may leave its root by `..`: that is the folder NAME, or
-    the package that holds the URDF (else the folder above it).
+    other path is relative to the URDF, or absolute, with `file://` before it or not. Backslashes are taken for slashes
+    where no file has them in its name. Links are followed as the system does; a URDF that is one lies in both places.
+    No address may leave its root by `..`: that is the folder NAME, or the package that holds the URDF (else the folder
+    above it).
 
     Raises:
-        MultimodalError: there is no such file, or the path leaves its root.
+        MultimodalError: there is no such file, or the address leaves its root.
     """
-    if (scheme := next((scheme for scheme in _SCHEMES if uri.startswith(scheme)), None)) is not None:
-        name, _, inside = unquote(uri.removeprefix(scheme)).partition("/")
-        candidates = [(root, root / inside) for root in _package_folders(name, urdf)]
+    scheme, inside = _split(uri)
+    if scheme not in ("", "file", *_SCHEMES) or "\0" in inside:
+        where = "" if "\0" in inside else f": an address of '{scheme}://', and meshes are read from files"
+        raise _UnusableError(f"not found{where}")
+    problems: dict[str, None] = {}
+    for address in dict.fromkeys((inside, inside.replace("\\", "/"))):
+        for root, relative in _places(scheme, address, urdf, problems):
+            candidate = root[1] / relative
+            plain = Path(os.path.normpath(candidate))
+            if not plain.is_relative_to(os.path.normpath(root[0])):
+                problems["leaves the folder of its robot by '..'"] = None
+            elif os.path.isfile(candidate):  # which takes names that no file can have, too
+                return plain if os.path.isfile(plain) and os.path.samefile(plain, candidate) else candidate
+            elif os.path.isfile(plain):
+                return plain
+    raise _UnusableError(next(iter(problems), "not found"))
+
+
+def _split(uri: str) -> tuple[str, str]:
+    """Return the scheme of an address in small letters, empty where it has none, and the rest with `%20` read."""
+    scheme, found, inside = uri.partition("://")
+    if not found or not scheme.isalpha():
+        scheme, found, inside = uri.partition(":")
+        return ("file", unquote(inside)) if found and scheme.lower() == "file" else ("", uri)
+    return scheme.lower(), unquote(inside)
+
+
+def _places(
+    scheme: str, address: str, urdf: Path, problems: dict[str, None]
+) -> Iterator[tuple[tuple[Path, Path], str]]:
+    """Yield where a mesh may be: (the folder that it may not leave, the folder that its path starts in), and its path.
+
+    Args:
+        scheme: of the address, in small letters.
+        address: without its scheme.
+        urdf: the file that names it.
+        problems: takes why a place is none, as the end of a sentence.
+    """
+    homes = tuple(dict.fromkeys((urdf.absolute(), urdf.resolve())))
+    if scheme in _SCHEMES:
+        name, _, inside = address.partition("/")
+        roots = [root for home in homes for root in _package_folders(name, home) if root.is_dir()]
+        for root in roots:
+            yield (root, root), inside.lstrip("/")
+        if roots:
+            problems[f"not found in the folder '{roots[0]}'"] = None
+        else:
+            problems[
+                f"not found: no folder '{name}' holds the URDF, lies beside it or above, or in "
+                f"{', '.join(ROOT_VARIABLES)}"
+            ] = None
+        return
+    local = address.removeprefix("localhost") if address.startswith("localhost/") and scheme == "file" else address
+    path = Path(local)
+    if ".." in path.parts or not path.is_absolute():
+        for home in homes:
+            yield (_own_root(home), home.parent), local
+    elif path.suffix.lower() in SUFFIXES:
+        yield (Path(path.anchor), Path(path.anchor)), local
     else:
-        path = Path(unquote(uri.removeprefix("file://")) if uri.startswith("file://") else uri)
-        candidates = [(_own_root(urdf), urdf.absolute().parent / path)]
-    refused = False
-    if "\0" in unquote(uri):
-        raise _UnusableError("not found")
-    for root, candidate in candidates:
-        plain = Path(os.path.normpath(candidate))
-        if not plain.is_relative_to(os.path.normpath(root)):
-            refused = True
-        elif os.path.isfile(plain):  # which takes names that no file can have, too
-            return plain
-    raise _UnusableError("leaves the folder of its robot" if refused else "not found")
+        problems[f"not found as a mesh: no {', '.join(SUFFIXES)} file"] = None
 
 
 def _package_folders(name: str, urdf: Path) -> Iterator[Path]:
-    if name in ("", ".", ".."):
+    if name in ("", ".", "..") or "\\" in name:
         return
-    for folder in urdf.absolute().parents:
+    for folder in urdf.parents:
         if folder.name == name:
             yield folder
         yield folder / name
@@ -122,7 +177,7 @@ def _package_folders(name: str, urdf: Path) -> Iterator[Path]:
 
 
 def _own_root(urdf: Path) -> Path:
-    folders = urdf.absolute().parents
+    folders = urdf.parents
     packages = (
         folder for folder in folders if any((folder / mark).is_file() for mark in ("package.xml", "robot.toml"))
     )
