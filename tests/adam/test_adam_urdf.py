@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import casadi as cs
@@ -11,8 +14,9 @@ import numpy as np
 import pytest
 
 from adam_robots import IRONCUB, example_robots, ironcub_joints
-from multimodal_to.adam import KinDynComputations, load_tree
+from multimodal_to.adam import KinDynComputations, Representations, load_tree
 from multimodal_to.adam.inspection import describe
+from multimodal_to.adam.urdf import _COUNTS
 from multimodal_to.errors import InputError, ModelError
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -356,3 +360,162 @@ def test_a_description_names_links_masses_and_what_is_merged_or_locked() -> None
     quiet = str(describe(pair()))
     assert "2 links, 1 moving joints" in quiet
     assert "b  1.000 kg  ← j (revolute -1 to 1 rad)" in quiet
+
+
+def star(*names: str) -> KinDynComputations:
+    """Return a robot with a link of each name on a base of its own joint each."""
+    parts = [joint(f"j{index}", "base", name) for index, name in enumerate(names)]
+    return KinDynComputations(robot(link("base"), *map(link, names), *parts))
+
+
+ALIKE = (
+    ("l-sole", "l_sole", "l sole", "l__sole", "_l_sole", "l_sole_", "l.sole", "L_sole"),
+    ("left foot", "left", "foot", "left_foot"),
+    ("foot", "dot_foot", "dot_nu_foot", "nu_foot"),
+    ("é", "è", "_", "ä b", "äb", "1"),
+)
+
+
+@pytest.mark.parametrize("names", ALIKE, ids=lambda names: names[0])
+def test_every_function_has_a_name_of_its_own(names: tuple[str, ...]) -> None:
+    """Also where names differ in blanks and signs only, and where the name of one quantity begins another's."""
+    kindyn = star(*names)
+    frames = [
+        getattr(kindyn, f"{of}_fun") for of in ("jacobian", "jacobian_dot", "jacobian_dot_nu", "relative_jacobian")
+    ]
+    functions = [function(name) for function in frames for name in names]
+    groups = [(), *((name,) for name in names), *itertools.permutations(names, 2), names]
+    functions += [function(group) for function in (kindyn.rnea_fun, kindyn.aba_fun) for group in groups]
+    functions += [kindyn.mass_matrix_fun()]
+    kindyn.g = [0, 0, -1.62]
+    functions += [kindyn.rnea_fun(), kindyn.mass_matrix_fun()]
+    kindyn.set_frame_velocity_representation(Representations.BODY_FIXED_REPRESENTATION)
+    functions += [kindyn.rnea_fun(), kindyn.mass_matrix_fun(), kindyn.jacobian_fun(names[0])]
+    assert len({function.name() for function in functions}) == len(functions)
+
+
+def test_a_name_that_looks_like_a_mark_is_marked() -> None:
+    """A frame that is called as the function of another one is."""
+    marked = star("l-sole").jacobian_fun("l-sole").name()
+    kindyn = star("l-sole", marked.removeprefix("jacobian_"))
+    names = {kindyn.jacobian_fun(frame).name() for frame in kindyn.frame_names[1:]}
+    assert len(names) == 2
+    assert marked in names
+
+
+@pytest.mark.parametrize("names", ALIKE, ids=lambda names: names[0])
+def test_wrenches_on_frames_of_alike_names_add_up_and_their_c_compiles(names: tuple[str, ...], tmp_path: Path) -> None:
+    kindyn, rng = star(*names), np.random.default_rng(1)
+    n = kindyn.NDoF
+    motion = (
+        np.eye(4),
+        rng.normal(size=n),
+        rng.normal(size=6),
+        rng.normal(size=n),
+        rng.normal(size=6),
+        rng.normal(size=n),
+    )
+    still = np.array(kindyn.rnea(*motion))
+    for group in [*((name,) for name in names), *itertools.permutations(names, 2), names]:
+        wrenches = {name: rng.normal(size=6) for name in group}
+        pushed = sum(np.array(kindyn.jacobian(name, *motion[:2])).T @ wrench for name, wrench in wrenches.items())
+        expected = still.ravel() - pushed
+        np.testing.assert_allclose(np.array(kindyn.rnea(*motion, wrenches)).ravel(), expected, atol=1e-12)
+        symbols = {name: cs.MX.sym("w", 6) for name in group}
+        graph = cs.Function("graph", [*symbols.values()], [kindyn.rnea(*motion, symbols)])
+        np.testing.assert_allclose(np.array(graph(*wrenches.values())).ravel(), expected, atol=1e-12)
+    generator = cs.CodeGenerator("functions.c", {"with_header": True})
+    for name in names:
+        generator.add(kindyn.jacobian_fun(name))
+        generator.add(kindyn.rnea_fun((name,)))
+    for pair_of_names in itertools.permutations(names[:3], 2):
+        generator.add(kindyn.rnea_fun(pair_of_names))
+    generator.generate(f"{tmp_path}/")
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("no C compiler")
+    done = subprocess.run(
+        [compiler, "-fsyntax-only", "-Werror", str(tmp_path / "functions.c")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[:500]
+
+
+def test_wrenches_on_one_frame_add_up() -> None:
+    """As where two jets are in one frame, or a jet where the robot touches the ground."""
+    kindyn, rng = star("b", "c"), np.random.default_rng(3)
+    motion = (np.eye(4), *(rng.normal(size=size) for size in (2, 6, 2, 6, 2)))
+    one, other, third = rng.normal(size=(3, 6))
+    twice = kindyn.rnea_fun(("b", "c", "b"))(*motion, one, other, third)
+    once = kindyn.rnea(*motion, {"b": one + third, "c": other})
+    np.testing.assert_allclose(np.array(twice), np.array(once), atol=1e-13)
+
+
+@pytest.mark.parametrize("kind", [cs.SX, cs.MX])
+def test_lists_of_symbols_are_taken_for_every_argument(kind: type) -> None:
+    """As a list, a tuple, an array of objects, rows of a matrix, with numbers between, and DM as well."""
+    kindyn, rng = star("b", "c"), np.random.default_rng(2)
+    H, s, v = kind.sym("H", 4, 4), kind.sym("s", 2), kind.sym("v", 6)
+    rows = [[H[i, j] for j in range(4)] for i in range(4)]
+    values = cs.DM.eye(4), rng.normal(size=2), rng.normal(size=6)
+    expected = np.array(kindyn.bias_force(*values, values[1]))
+    lists = [
+        (rows, [s[0], s[1]], cs.vertsplit(v), (s[0], s[1])),
+        (tuple(map(tuple, rows)), (s[0], s[1]), [v[:3], v[3:]], [s]),
+        ([cs.horzcat(*row) for row in rows], s, v, np.array([s[0], s[1]], dtype=object)),
+    ]
+    for arguments in lists:
+        function = cs.Function("f", [H, s, v], [kindyn.bias_force(*arguments)])
+        np.testing.assert_allclose(np.array(function(*values)), expected, atol=1e-13)
+    mixed = kindyn.mass_matrix(np.eye(4), [s[0], 0.3])
+    assert isinstance(mixed, kind)
+    assert isinstance(kindyn.mass_matrix(np.eye(4), [cs.DM(0.1), 0.3]), cs.DM)
+    with pytest.raises(InputError, match=r"'s' has shape \(3, 1\)"):
+        kindyn.mass_matrix(np.eye(4), [s[0], s[1], s[0]])
+
+
+def test_sx_and_mx_together_are_refused_in_one_sentence() -> None:
+    kindyn, x, y = star("b", "c"), cs.SX.sym("x", 2), cs.MX.sym("y", 2)
+    with pytest.raises(InputError, match="mass_matrix: some arguments are SX and some MX"):
+        kindyn.mass_matrix(cs.MX.eye(4), x)
+    with pytest.raises(InputError, match="mass_matrix: 's' mixes SX and MX"):
+        kindyn.mass_matrix(np.eye(4), [x[0], y[0]])
+    with pytest.raises(InputError, match=r"rnea.*: some arguments are SX and some MX"):
+        kindyn.rnea(np.eye(4), x, np.zeros(6), x, np.zeros(6), x, {"b": cs.MX.sym("w", 6)})
+
+
+NUMBERS = [(element, key, counts[-1]) for element, keys in _COUNTS.items() for key, counts in keys.items()]
+
+
+@pytest.mark.parametrize(("element", "key", "count"), NUMBERS)
+@pytest.mark.parametrize("text", ["0,0,1", "0, 0, 0.3", "0;1", "1 2 3 4 5", "", "one", "1_5", "nan"])
+def test_numbers_that_are_none_are_named_by_file_element_and_attribute(
+    element: str, key: str, count: int, text: str, tmp_path: Path
+) -> None:
+    """Every attribute of every element that holds numbers, with the texts that other readers may take."""
+    others = {name: " ".join("1" * counts[-1]) for name, counts in _COUNTS[element].items() if name != key}
+    stated = " ".join(f'{name}="{value}"' for name, value in {**others, key: text}.items())
+    extra = {"mimic": ' joint="j"', "mesh": ' filename="m.stl"'}.get(element, "")
+    whole, inside = f"<{element} {stated}{extra}/>", {"link": "", "joint": LIMIT}
+    if element in ("mass", "inertia"):
+        inside["link"] = f"<inertial>{whole}</inertial>"
+    elif element in ("box", "cylinder", "sphere", "mesh"):
+        inside["link"] = f"<visual><geometry>{whole}</geometry></visual>"
+    elif element == "color":
+        inside["link"] = (
+            f'<visual><geometry><box size="1 1 1"/></geometry><material name="m">{whole}</material></visual>'
+        )
+    elif element == "origin":
+        inside["link"] = f'<inertial>{whole}<mass value="1"/></inertial>'
+    else:
+        inside["joint"] = whole
+    file = tmp_path / "r.urdf"
+    file.write_text(robot(link("a"), link("b", inside["link"]), joint("j", "a", "b", inside=inside["joint"])))
+    expected = "a finite number" if count == 1 else f"{count} finite numbers"
+    with pytest.raises(ModelError) as caught:
+        load_tree(file)
+    said = str(caught.value)
+    assert said.startswith(f"'{file}': {key}=\"{text}\" of <{element}> in '")
+    assert f"is not {expected}" in said

@@ -210,3 +210,12 @@ def test_mimic_joints_are_where_their_leader_has_them_in_every_export(tmp_path):
         np.testing.assert_allclose(table[f"follower_positions.{name}"][1], expected[name][0], atol=1e-15)
         assert mat["follower_names"][index] == name
         np.testing.assert_allclose(mat["follower_velocities"][index], expected[name][1], atol=1e-15)
+
+
+def test_jets_of_alike_names_have_a_column_each(tmp_path):
+    robot = hopper(tmp_path)
+    left, right = robot.jets
+    for names in (("left arm", "left_arm"), ("a b_c", "a_b c"), ("left", "right")):
+        named = replace(robot, jets=(replace(left, name=names[0]), replace(right, name=names[1])))
+        table = export.columns(named, take_off(named))
+        assert sum(name.startswith("thrust.") for name in table) == 2

@@ -10,6 +10,7 @@ import pytest
 import umsgpack
 import yourdfpy
 
+from hopper import hopper
 from multimodal_to import replay, scenarios
 from multimodal_to.errors import InputError, OutputError
 from multimodal_to.models.robot import load_robot
@@ -17,6 +18,8 @@ from multimodal_to.models.terrain import Stairs
 from multimodal_to.models.terrain_mesh import CELL
 from multimodal_to.replay import effects, scene
 from multimodal_to.replay import page as pages
+from multimodal_to.replay.bodies import link_paths, link_poses
+from multimodal_to.replay.visuals import appearance
 from multimodal_to.scenarios.data import to_json
 from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.derived import flight_force, frame_poses
@@ -348,3 +351,32 @@ def test_the_camera_stands_where_the_ground_hides_no_step(robot, trajectory, tmp
     path = replay.write_html(robot, replace(trajectory, scenario_json=kept), tmp_path / "p.html", meshes=False)
     x, _, _ = Stage(path.read_text(encoding="utf-8")).value("/Cameras/default/rotated/<object>", "position", 0)
     assert x * side > 0.5
+
+
+NAMES = {"body": "robot", "left_wing": "robot/left", "left_jet": "left", "right_wing": "visual_0", "right_jet": "flame"}
+
+
+def test_links_are_in_their_place_whatever_they_are_called(tmp_path):
+    """With slashes, as the scene's own nodes, and as each other's ways: no two share a node, and none is lost."""
+    hopper(tmp_path)
+    for file in (tmp_path / "hopper.urdf", tmp_path / "robot.toml"):
+        text = file.read_text(encoding="utf-8")
+        for old, new in NAMES.items():
+            text = text.replace(f'"{old}"', f'"{new}"')
+        box = '<visual><geometry><box size="1 1 1"/></geometry></visual><inertial>'
+        file.write_text(text.replace("<inertial>", box), encoding="utf-8")
+    robot = load_robot(tmp_path)
+    motion, look = take_off(robot), appearance(robot.urdf)
+    paths = link_paths(robot, look, "robot")
+    assert set(paths) == set(NAMES.values())
+    poses = link_poses(robot, motion, paths)
+    at = {paths[name]: pose for name, pose in poses.items()}
+    drawn = [f"{paths[visual.link]}/{visual.name}" for visual in look.visuals]
+    drawn += [f"{paths[jet.frame]}/flame" for jet in robot.jets]
+    assert len({*drawn, *at}) == len(drawn) + len(NAMES)
+    for name, path in paths.items():
+        parts = path.split("/")
+        world = np.eye(4)
+        for length in range(2, len(parts) + 1):
+            world = world @ at["/".join(parts[:length])]
+        np.testing.assert_allclose(world, frame_poses(robot, motion, name), atol=1e-9)

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from adam_robots import example_robots
+from hopper import hopper
 from multimodal_to.errors import ModelError
 from multimodal_to.models.robot import load_robot
+from multimodal_to.models.terrain import FlatGround
 from multimodal_to.simulation import build_model, disagreement, play, random_states
 from synthetic import take_off
 from tied_hopper import tied_hopper
@@ -106,3 +108,17 @@ def test_what_cannot_be_merged_is_refused_in_one_line(tmp_path):
 
 def test_a_robot_of_bodies_has_no_notes(ironcub):
     assert build_model(ironcub).notes == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("left_pitch", "left"), ("left_pitch", "base"), ("body", "world"), ("front_left", "ground")]
+)
+def test_names_of_the_robot_may_be_those_of_the_simulation(tmp_path, old, new):
+    """A jet is called `left`, MuJoCo's world `world`, and the ground `ground`."""
+    hopper(tmp_path)
+    for file in (tmp_path / "hopper.urdf", tmp_path / "robot.toml"):
+        text = file.read_text(encoding="utf-8")
+        file.write_text(text.replace(f'"{old}"', f'"{new}"').replace(f"\n{old} =", f"\n{new} ="), encoding="utf-8")
+    robot = load_robot(tmp_path)
+    assert build_model(robot, FlatGround()).points.size == len(robot.contacts)
+    assert disagreement(robot, random_states(robot, 5)) < 1e-10

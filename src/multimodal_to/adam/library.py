@@ -40,6 +40,7 @@ class Library:
         self._gravity = _checked_gravity(gravity)
         self._representation = checked_representation(representation)
         self._f_opts = dict(f_opts or {})
+        self._made_for = self._representation, *self._gravity
         self._functions: dict[tuple[object, ...], cs.Function] = {}
 
     @classmethod
@@ -130,6 +131,12 @@ class Library:
         return dict(self._f_opts)
 
     # ---------------------------------------------------------------- the functions
+
+    @property
+    def _changed(self) -> tuple[float, ...]:
+        """Return representation and gravity where they are no longer those of the constructor; else nothing."""
+        now = self._representation, *self._gravity
+        return () if now == self._made_for else tuple(float(number) for number in now)
 
     def _kept(self, key: tuple[str, ...], make: Callable[[], cs.Function]) -> cs.Function:
         """Return the function of a key under the present representation and gravity; make it where it is not there."""

@@ -16,6 +16,7 @@ type checkers, editors, `help` and the API page see them. Arguments have the sam
 
 from __future__ import annotations
 
+import hashlib
 import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -58,6 +59,9 @@ _OTHERS = {
     "external_wrenches": "By frame name, the (force, moment) that the world applies there; see `rnea`.",
 }
 
+_PLAIN = re.compile(r"[A-Za-z0-9]+(?:_[A-Za-z0-9]+)*(?<!_x[0-9a-f]{16})")
+"""Names that are ones in CasADi and in C as they are, and that end as no mark does."""
+
 Formula = TypeVar("Formula", bound=Callable[..., Any])
 
 
@@ -79,7 +83,10 @@ class WrenchFunction(Protocol):
     """Returns the `casadi.Function` of a quantity under external wrenches; it is built on first use and kept."""
 
     def __call__(self, frames: Sequence[str] = ()) -> cs.Function:
-        """Return the quantity's function; it takes one more argument, a wrench, for each of `frames`."""
+        """Return the quantity's function; it takes one more argument, a wrench, for each of `frames`.
+
+        Wrenches on a frame that is given several times add up.
+        """
 
 
 def quantity(formula: Formula) -> Formula:
@@ -102,7 +109,10 @@ def quantity(formula: Formula) -> Formula:
         key = [arguments["frame"]] if "frame" in arguments else [tuple(wrenches)] if wrenches else []
         function = getattr(self, f"{name}_fun")(*key)
         values = [value for argument, value in arguments.items() if argument in ARGUMENTS]
-        result = function(*(_checked(function, i, value) for i, value in enumerate([*values, *wrenches.values()])))
+        each = [_checked(function, i, value) for i, value in enumerate([*values, *wrenches.values()])]
+        if any(isinstance(value, cs.SX) for value in each) and any(isinstance(value, cs.MX) for value in each):
+            raise InputError(f"{function.name()}: some arguments are SX and some MX; expected one kind of symbols")
+        result = function(*each)
         if isinstance(result, cs.DM) and not result.is_regular():
             raise ModelError(
                 f"{name}: the result is no finite number; in this posture something moves without moving any mass, or "
@@ -147,7 +157,7 @@ def _function(
     library: Library, method: Callable[..., Any], output: str, *, frame: str | None = None, pushed: Sequence[str] = ()
 ) -> cs.Function:
     """Return the function of a quantity, of the frame `frame`, with wrenches on the frames `pushed`."""
-    formula, frames = inspect.unwrap(method), pushed if frame is None else (frame,)
+    formula, frames = inspect.unwrap(method), tuple(pushed) if frame is None else (frame,)
     for name in frames:
         library.tree.frame(name)
 
@@ -157,19 +167,49 @@ def _function(
         symbols = [cs.SX.sym(of.symbol, n if of.shape[0] is None else of.shape[0], of.shape[1]) for of in used]
         wrenches = [cs.SX.sym(f"w_{index}", 6, 1) for index, _ in enumerate(pushed)]
         first = [] if frame is None else [frame]
-        last = [dict(zip(pushed, wrenches, strict=True))] if pushed else []
+        last = [_summed(pushed, wrenches)] if pushed else []
         expression = cs.cse(formula(library, *first, *symbols, *last))
         labels = [*(of.symbol for of in used), *(f"w_{index}" for index, _ in enumerate(pushed))]
-        safe = re.sub(r"[^A-Za-z0-9]+", "_", " ".join((formula.__name__, *frames))).strip("_")
+        name = _function_name(library, formula.__name__, frames)
         try:
-            return cs.Function(safe, [*symbols, *wrenches], [expression], labels, [output], library.f_opts)
+            return cs.Function(name, [*symbols, *wrenches], [expression], labels, [output], library.f_opts)
         except (RuntimeError, NotImplementedError) as error:
             if not library.f_opts:
                 raise
             why = str(error).splitlines()[1:2]
-            raise InputError(f"{safe}: CasADi takes no f_opts = {library.f_opts}: {''.join(why)}") from error
+            raise InputError(f"{name}: CasADi takes no f_opts = {library.f_opts}: {''.join(why)}") from error
 
     return library._kept((formula.__name__, *frames), make)
+
+
+def _summed(frames: Sequence[str], wrenches: Sequence[cs.SX]) -> dict[str, cs.SX]:
+    """Return the wrench on each frame: the sum of its own where it is given several times."""
+    total: dict[str, cs.SX] = {}
+    for frame, wrench in zip(frames, wrenches, strict=True):
+        total[frame] = total[frame] + wrench if frame in total else wrench
+    return total
+
+
+def _function_name(library: Library, name: str, frames: tuple[str, ...]) -> str:
+    """Return what the function of a quantity is called: `jacobian_l_sole`, a name in C that no other function has.
+
+    Names that say the same only by their look get a mark of their own: `l-sole` is none in C and would be `l_sole`,
+    `left foot` and the two frames `left` and `foot` would meet, and so would `jacobian_dot` of `foot` and `jacobian` of
+    `dot_foot`. So does what is made after gravity or the representation have changed.
+
+    Args:
+        library: that it is of.
+        name: of the quantity.
+        frames: that it is about.
+    """
+    plain = "_".join((name, *frames))
+    quantities = (attribute.removesuffix("_fun") for attribute in dir(type(library)) if attribute.endswith("_fun"))
+    meant = max((other for other in quantities if f"{plain}_".startswith(f"{other}_")), key=len)
+    if meant == name and len(frames) < 2 and not library._changed and _PLAIN.fullmatch(plain):
+        return plain
+    key = repr((name, frames, library._changed)).encode("utf-8", errors="surrogatepass")
+    readable = re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
+    return f"{readable}_x{hashlib.sha256(key).hexdigest()[:16]}"
 
 
 def _described(function: Callable[..., cs.Function], method: Callable[..., Any], output: str) -> Any:
@@ -185,8 +225,28 @@ def _described(function: Callable[..., cs.Function], method: Callable[..., Any],
     return function
 
 
+def _assembled(argument: Any) -> Any:
+    """Return one CasADi matrix for a list, a list of rows or an array that holds CasADi's own; else the argument."""
+    if isinstance(argument, np.ndarray) and argument.dtype == object:
+        argument = argument.tolist()
+    if not isinstance(argument, list | tuple):
+        return argument
+    rows = [cs.horzcat(*row) if _holds_casadi(row) else row for row in argument]
+    return cs.vertcat(*rows) if any(isinstance(row, cs.SX | cs.MX | cs.DM) for row in rows) else argument
+
+
+def _holds_casadi(row: Any) -> bool:
+    return isinstance(row, list | tuple) and any(isinstance(one, cs.SX | cs.MX | cs.DM) for one in row)
+
+
 def _checked(function: cs.Function, index: int, argument: Any) -> Any:
     """Return an argument of a function in a form that CasADi takes; refuse a wrong shape, a NaN and an infinity."""
+    try:
+        argument = _assembled(argument)
+    except (NotImplementedError, RuntimeError) as error:
+        raise InputError(
+            f"{function.name()}: '{function.name_in(index)}' mixes SX and MX, or rows of other lengths"
+        ) from error
     symbolic = isinstance(argument, cs.SX | cs.MX)
     value = argument if symbolic or isinstance(argument, cs.DM) else np.asarray(argument, dtype=float)
     expected, name = tuple(function.size_in(index)), function.name_in(index)

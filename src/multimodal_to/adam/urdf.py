@@ -245,6 +245,7 @@ def _refuse_non_numbers(root: Any, source: str) -> None:
 def _number_fault(text: str, counts: Sequence[int], largest: float) -> str | None:
     """Return what is wrong with a text of numbers, as the end of a sentence about it."""
     finite = "is not a finite number" if counts == (1,) else f"is not {counts[-1]} finite numbers"
+    finite += "; expected blanks between numbers, and a point in them" * ("," in text or ";" in text)
     try:
         found = numbers(text)
     except ValueError:

@@ -46,10 +46,10 @@ def columns(robot: Robot, trajectory: Trajectory) -> dict[str, tuple[str, Array]
     table = {"time": ("s", trajectory.time)}
     for name, quantity in QUANTITIES.items():
         rows = labels(name, trajectory, separator=".")
-        for label, unit, values in zip(
-            rows, row_units(quantity, robot, len(rows)), getattr(trajectory, name), strict=True
-        ):
-            place = label.replace(" ", "_") if quantity.of == "jet" else label
+        without_blanks = [row.replace(" ", "_") for row in rows]
+        places = without_blanks if quantity.of == "jet" and len({*without_blanks}) == len(rows) else rows
+        units = row_units(quantity, robot, len(rows))
+        for place, unit, values in zip(places, units, getattr(trajectory, name), strict=True):
             table[".".join(filter(None, (name, place)))] = (unit, values)
     names = row_labels(trajectory, JOINT_TORQUES.of, JOINT_TORQUES.axes)
     for joint, unit, values in zip(names, row_units(JOINT_TORQUES, robot), torques, strict=True):

@@ -11,7 +11,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.urdf import parse_urdf
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.meshes import shaded
-from multimodal_to.replay.scene import Y_TO_Z, Scene, SmoothMesh, quaternions, shapes
+from multimodal_to.replay.scene import Y_TO_Z, Scene, SmoothMesh, quaternions, segment, shapes
 from multimodal_to.replay.visuals import Appearance, Visual
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import frame_poses
@@ -33,10 +33,10 @@ def link_paths(robot: Robot, appearance: Appearance, root: str) -> dict[str, str
     above = {joint.child: joint.parent for joint in described.joints}
 
     def path(name: str) -> str:
-        parts, link = [name], above.get(name)
+        parts, link = [segment(name)], above.get(name)
         while link is not None:
             if link in shown:
-                parts.append(link)
+                parts.append(segment(link))
             link = above.get(link)
         return "/".join([root, *reversed(parts)])
 
@@ -52,9 +52,10 @@ def link_poses(robot: Robot, trajectory: Trajectory, paths: Mapping[str, str]) -
         paths: path in the scene of each link, from `link_paths`.
     """
     poses = {name: frame_poses(robot, trajectory, name) for name in paths}
-    parents = {name: path.split("/")[-2] for name, path in paths.items()}
+    by_path = {path: name for name, path in paths.items()}
+    parents = {name: by_path.get(path.rpartition("/")[0]) for name, path in paths.items()}
     return {
-        name: np.linalg.inv(poses[parents[name]]) @ pose if parents[name] in poses else pose
+        name: pose if (parent := parents[name]) is None else np.linalg.inv(poses[parent]) @ pose
         for name, pose in poses.items()
     }
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
-from multimodal_to.replay.scene import Y_TO_Z, Scene, SmoothMesh, shapes, translation, turns_from_z
+from multimodal_to.replay.scene import Y_TO_Z, Scene, SmoothMesh, segment, shapes, translation, turns_from_z
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import at_knots, flight_force
 
@@ -49,8 +49,12 @@ def draw_flames(
         steady: keep the opacity of full thrust, for a viewer that cannot move what belongs to a material.
     """
     strongest = max((jet.thrust_max for jet in robot.jets), default=1.0)
+    frames = list[str]()
     for jet, row in zip(robot.jets, np.maximum(thrust, 0.0), strict=True):
-        path, radius = f"{paths[jet.frame]}/flame", _NOZZLE_RADIUS * math.sqrt(jet.thrust_max / strongest)
+        burning = frames.count(jet.frame)
+        frames.append(jet.frame)
+        path = f"{paths[jet.frame]}/flame" + (f"_{burning}" if burning else "")
+        radius = _NOZZLE_RADIUS * math.sqrt(jet.thrust_max / strongest)
         glow = opacity * (_FAINTEST + (1.0 - _FAINTEST) * np.minimum(row / jet.thrust_max, 1.0))
         for name, colour, width, length, brightest in _LAYERS:
             material = shapes.MeshBasicMaterial(
@@ -80,7 +84,7 @@ def draw_contact_forces(scene: Scene, robot: Robot, trajectory: Trajectory, root
     positions, smallest = trajectory.per_contact("contact_positions"), flight_force(robot)
     forces = at_knots(trajectory, "contact_forces").reshape(positions.shape)
     for name, position, force in zip(trajectory.contact_names, positions, forces, strict=True):
-        path, size = f"{root}/{name}", np.linalg.norm(force, axis=0)
+        path, size = f"{root}/{segment(name)}", np.linalg.norm(force, axis=0)
         shaft, tip = shapes.Cylinder(0.75, radius=0.006), shapes.Cylinder(0.25, radiusTop=0.0, radiusBottom=0.015)
         scene.add(f"{path}/shaft", shaft, colour, translation([0.0, 0.0, 0.375]) @ Y_TO_Z)
         scene.add(f"{path}/tip", tip, colour, translation([0.0, 0.0, 0.875]) @ Y_TO_Z)

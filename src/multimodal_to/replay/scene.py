@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import dataclass, field
 from typing import Any
@@ -26,6 +27,7 @@ __all__ = [
     "SmoothMesh",
     "meshcat",
     "quaternions",
+    "segment",
     "shapes",
     "translation",
     "turns_from_z",
@@ -34,6 +36,7 @@ __all__ = [
 HOLD = 1.0
 """The last pose stands this long before the motion starts again [s]."""
 
+_PART = re.compile(r"flame(_[0-9]+)?|(visual|.*_mesh)_[0-9]+(_[0-9]+)?|<object>", re.DOTALL)
 _STILL = 1e-9  # a property that changes less than this needs no keyframes
 _TRACK_TYPES = {
     "position": "vector3",
@@ -141,6 +144,15 @@ def translation(offset: Any) -> Array:
     transform: Array = np.eye(4)
     transform[:3, 3] = offset
     return transform
+
+
+def segment(name: str) -> str:
+    """Return a link's or frame's name as one segment of a path: no two are the same, and none is that of a part of one.
+
+    A segment holds no slash. Parts of a link are its flame and its visuals.
+    """
+    safe = name.replace("%", "%25").replace("/", "%2F")
+    return f"%{safe}" if _PART.fullmatch(name) else safe
 
 
 def quaternions(poses: Array) -> Array:

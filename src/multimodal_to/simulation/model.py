@@ -143,7 +143,7 @@ def build_model(
     _add_couplings(mujoco, spec, robot)
     mu = robot.friction if friction is None else friction
     for name in robot.contact_names:
-        spec.body(name).add_geom(
+        spec.body(_body_name(robot, name)).add_geom(
             name=name,
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
             size=[POINT_RADIUS, 0.0, 0.0],
@@ -155,7 +155,8 @@ def build_model(
             conaffinity=0,
         )
     if surface is not None:
-        _add_ground(mujoco, spec, surface, mu, np.zeros(2) if middle is None else middle, reach)
+        ground = _free("ground", robot.contact_names)
+        _add_ground(mujoco, spec, surface, mu, np.zeros(2) if middle is None else middle, reach, ground)
     _add_actuators(mujoco, spec, robot, robot.joint_limits.effort if torque_limits else None)
     try:
         model = spec.compile()
@@ -210,14 +211,16 @@ def _add_bodies(mujoco: ModuleType, spec: Any, robot: Robot) -> tuple[str, ...]:
     below: dict[str, list[Joint]] = {}
     for joint in joints:
         below.setdefault(joint.parent, []).append(joint)
-    base = spec.worldbody.add_body(name=tree.base)
-    base.add_freejoint(name="base")
+    base = spec.worldbody.add_body(name=_body_name(robot, tree.base))
+    base.add_freejoint()
     pending = [(tree.base, base)]
     while pending:
         name, body = pending.pop()
         _set_inertia(body, by_name[name])
         for joint in reversed(below.get(name, [])):
-            child = body.add_body(name=joint.child, pos=joint.translation, quat=_quaternion(mujoco, joint.rotation))
+            child = body.add_body(
+                name=_body_name(robot, joint.child), pos=joint.translation, quat=_quaternion(mujoco, joint.rotation)
+            )
             if joint.name in tree.joint_names or joint.name in tree.followers:
                 kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
                 child.add_joint(name=joint.name, type=kind, axis=joint.axis)
@@ -312,7 +315,22 @@ def _hold(mujoco: ModuleType, body: Any, joint: Joint, value: float) -> None:
     body.quat = turned
 
 
-def _add_ground(mujoco: ModuleType, spec: Any, surface: Surface, mu: float, middle: Array, reach: float) -> None:
+def _body_name(robot: Robot, link: str) -> str:
+    """Return what the body of a link is called: as the link, or otherwise where MuJoCo's own world is called so."""
+    return _free(link, robot.kindyn.frame_names) if link == "world" else link
+
+
+def _free(name: str, taken: Iterable[str]) -> str:
+    """Return a name that is not taken: the name itself, with as many primes behind it as that needs."""
+    names = set(taken)
+    while name in names:
+        name += "'"
+    return name
+
+
+def _add_ground(
+    mujoco: ModuleType, spec: Any, surface: Surface, mu: float, middle: Array, reach: float, name: str
+) -> None:
     """Add the ground, one radius of the contact points deeper along its normal.
 
     Args:
@@ -322,6 +340,7 @@ def _add_ground(mujoco: ModuleType, spec: Any, surface: Surface, mu: float, midd
         mu: Coulomb's friction coefficient [1].
         middle: of a ground that is no plane, in the world [m], (2,).
         reach: how far that goes to each side [m].
+        name: of the ground's geom.
     """
     contact = {"condim": 3, "friction": [mu, 0.0, 0.0], "solref": [CONTACT_TIME, 1.0], "contype": 0, "conaffinity": 1}
     if isinstance(surface, FlatGround | Plane):
@@ -329,7 +348,7 @@ def _add_ground(mujoco: ModuleType, spec: Any, surface: Surface, mu: float, midd
         _, normal, tangents = (np.array(part) for part in frame_function(surface)(at))
         rotation = np.column_stack([tangents, normal])
         spec.worldbody.add_geom(
-            name="ground",
+            name=name,
             type=mujoco.mjtGeom.mjGEOM_PLANE,
             size=[0.0, 0.0, 1.0],
             quat=_quaternion(mujoco, rotation),
@@ -347,14 +366,14 @@ def _add_ground(mujoco: ModuleType, spec: Any, surface: Surface, mu: float, midd
     heights = heights - POINT_RADIUS / normals[2]
     low, span = float(heights.min()), float(max(np.ptp(heights), 1e-6))
     spec.add_hfield(
-        name="ground",
+        name=name,
         nrow=count,
         ncol=count,
         size=[reach, reach, span, DEPTH],
         userdata=((heights - low) / span).tolist(),
     )
     spec.worldbody.add_geom(
-        name="ground", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="ground", pos=[*middle, low], **contact
+        name=name, type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname=name, pos=[*middle, low], **contact
     )
 
 
@@ -381,7 +400,10 @@ def _add_actuators(mujoco: ModuleType, spec: Any, robot: Robot, limits: Array | 
             forcerange=[-limit, limit] if limited else [0.0, 0.0],
         )
     for jet in robot.jets:
-        spec.body(jet.frame).add_site(name=jet.name)
+        spec.body(_body_name(robot, jet.frame)).add_site(name=jet.name)
         spec.add_actuator(
-            name=jet.name, trntype=mujoco.mjtTrn.mjTRN_SITE, target=jet.name, gear=[0.0, 0.0, -1.0, 0.0, 0.0, 0.0]
+            name=_free(jet.name, robot.joint_names),
+            trntype=mujoco.mjtTrn.mjTRN_SITE,
+            target=jet.name,
+            gear=[0.0, 0.0, -1.0, 0.0, 0.0, 0.0],
         )
