@@ -5,20 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from multimodal_to.models.robot import Posture, Robot
+from multimodal_to.models.state import State
+from multimodal_to.ocp import given
 from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.variables import Bounds
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 from multimodal_to.trajectory import rules
 
 _AT_REST = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
-_NO_FORCE = 0.01
-"""Largest contact force component left at a knot that has to be free of contact [N]."""
 _UPRIGHT = 1e-3
 """How far the base's quaternion may be from upright at an end in the air [1]."""
 _ORIENTATION = np.array([0.0, 0.0, 0.0, 1.0])
 
 
-def set_boundary(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture, rule: str) -> None:
+def set_boundary(
+    bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture, rule: str, initial: State | None = None
+) -> None:
     """Hold the first and last knots as the scenario says.
 
     Args:
@@ -27,8 +29,15 @@ def set_boundary(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Pos
         scenario: the task.
         standing: the posture that a motion that starts on its feet starts in.
         rule: name of the integration rule.
+        initial: the state that a motion with a given start starts in.
+
+    Raises:
+        ScenarioError: what is held is outside its range.
     """
-    _set_start(bounds, robot, scenario, standing)
+    if initial is not None:
+        given.set_start(bounds, robot, scenario, initial, rule)
+    else:
+        _set_start(bounds, robot, scenario, standing)
     _set_end(bounds, scenario, rule)
     if scenario.mid_height_min is not None:
         low = bounds.lower["com_position"]
@@ -42,7 +51,7 @@ def _set_start(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Postu
         fix(name, 0, 0.0)
     if scenario.start is Start.HOVER:
         fix("base_quaternion_xyzw", 0, _ORIENTATION, within=_UPRIGHT)
-        fix("contact_forces", 0, 0.0, within=_NO_FORCE)
+        fix("contact_forces", 0, 0.0, within=given.NO_FORCE)
         return
     fix("base_position", 0, standing.base_position)
     fix("base_quaternion_xyzw", 0, standing.base_quaternion_xyzw)
@@ -69,5 +78,5 @@ def _set_end(bounds: Bounds, scenario: Scenario, rule: str) -> None:
             fix("thrust_rate", knot, 0.0)
         # Where velocities are between knots, the forces of the knot before the last one make the last velocity.
         for knot in (last - 1, last) if rules.instant(rule, "com_velocity") else (last,):
-            fix("contact_forces", knot, 0.0, within=_NO_FORCE)
+            fix("contact_forces", knot, 0.0, within=given.NO_FORCE)
         fix("base_quaternion_xyzw", last, _ORIENTATION, within=_UPRIGHT)

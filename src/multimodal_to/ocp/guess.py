@@ -181,7 +181,7 @@ def hop(robot: Robot, scenario: Scenario, heights: Array) -> tuple[Array, Array]
 
 def _weight_flown(robot: Robot, scenario: Scenario) -> Array:
     """Return the share of the weight that the thrusts carry at every knot, (N + 1,): rising on a walk into the air."""
-    first = float(scenario.start is Start.HOVER and bool(robot.jets))
+    first = float(scenario.start is not Start.STANDING and bool(robot.jets))
     last = float(scenario.terminal is Terminal.HOVER and bool(robot.jets) and scenario.guess_steps > 0)
     return np.linspace(first, last, scenario.knots + 1)
 
