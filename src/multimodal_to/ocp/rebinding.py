@@ -18,7 +18,7 @@ from multimodal_to.scenarios.scenario import Scenario, Terminal
 
 
 def rebind(problem: Problem, scenario: Scenario, initial: State | None = None) -> Problem:
-    """Return a problem with the bounds of a changed scenario, and everything else as it is.
+    """Return a problem with the bounds of a changed scenario, and everything else as it is, also its start guess.
 
     Args:
         problem: that is built.
@@ -56,7 +56,7 @@ def rebind(problem: Problem, scenario: Scenario, initial: State | None = None) -
         box_upper=box_upper,
         row_lower=row_lower,
         row_upper=row_upper,
-        guess=np.clip(guessed(robot, scenario, initial.posture if initial else standing, layout, scale), lower, upper),
+        guess=np.clip(problem.guess, lower, upper),
         initial=initial,
     )
 
