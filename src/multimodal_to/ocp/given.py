@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -45,6 +47,29 @@ def check(robot: Robot, scenario: Scenario, initial: State | None) -> None:
     initial.refuse_other_robot(robot)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Kinematics:
+    """What follows from a state."""
+
+    com: Array  # [m], (3,)
+    momentum: Array  # velocity of the CoM [m/s] and angular momentum about it [kg m²/s], (6,)
+    points: Array  # of contact, one after the other [m], (3 contacts,)
+
+
+@lru_cache(maxsize=4)
+def _kinematics(robot: Robot, initial: State) -> _Kinematics:
+    return _Kinematics(
+        com=initial.com(robot),
+        momentum=np.concatenate(initial.momentum(robot)),
+        points=contact_positions(robot, initial.posture),
+    )
+
+
+def com(robot: Robot, initial: State) -> Array:
+    """Return where the CoM is in a state [m], (3,)."""
+    return _kinematics(robot, initial).com
+
+
 def set_start(bounds: Bounds, robot: Robot, scenario: Scenario, initial: State, rule: str) -> None:
     """Hold the first knot at a state, also where that is outside a range; forces and throttles are found.
 
@@ -57,12 +82,12 @@ def set_start(bounds: Bounds, robot: Robot, scenario: Scenario, initial: State, 
         initial: the state.
         rule: name of the integration rule.
     """
-    com_velocity, angular_momentum = initial.momentum(robot)
-    points = contact_positions(robot, initial.posture)
+    at = _kinematics(robot, initial)
+    points = at.points
     held: dict[str, Array] = {
-        "com_position": initial.com(robot),
-        "com_velocity": com_velocity,
-        "angular_momentum": angular_momentum,
+        "com_position": at.com,
+        "com_velocity": at.momentum[:3],
+        "angular_momentum": at.momentum[3:],
         "base_position": initial.base_position,
         "base_quaternion_xyzw": initial.base_quaternion_xyzw,
         "base_linear_velocity": initial.base_linear_velocity,
@@ -85,7 +110,7 @@ def set_start(bounds: Bounds, robot: Robot, scenario: Scenario, initial: State, 
 
 AT_START: Mapping[str, Callable[[Robot, State], Array]] = MappingProxyType(
     {
-        "momentum_at_start": lambda robot, state: np.concatenate(state.momentum(robot)),
+        "momentum_at_start": lambda robot, state: _kinematics(robot, state).momentum,
         "base_twist_at_start": lambda robot, state: np.concatenate(
             [state.base_linear_velocity, state.base_angular_velocity]
         ),

@@ -73,7 +73,7 @@ def started(robot: Robot, scenario: Scenario, initial: State | None) -> Scenario
     """Return a scenario with the CoM of the state that it starts in, if it starts in a given one."""
     if initial is None:
         return scenario
-    x, y, z = (float(value) for value in initial.com(robot))
+    x, y, z = (float(value) for value in given.com(robot, initial))
     return replace(scenario, initial_com=(x, y, z))
 
 

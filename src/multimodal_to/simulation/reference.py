@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -28,6 +29,11 @@ class Reference:
     thrust: Array  # T [N], (steps, jets)
     thrust_rate: Array  # Ṫ [N/s], (steps, jets)
     throttle: Array  # u [%], (steps, jets)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Reference]) -> Reference:
+        """Return references that follow one another as one."""
+        return cls(**{entry.name: np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(cls)})
 
 
 def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) -> Reference:

@@ -79,7 +79,7 @@ class Ipopt:
     where the start guess has them.
     """
     barrier_start: float = 0.1
-    barrier_warm: float = 1e-3  # where a solve that starts from an answer begins
+    barrier_warm: float = 1e-4  # where a solve that starts from an answer begins
     linear_solver: str = linear_solvers.AUTO
     """What factorises, one of `linear_solvers.LINEAR_SOLVERS`: by default the native library's `"stages"`, or MUMPS."""
     hsl_library: str = ""  # file of the HSL library; empty: looked for
