@@ -103,9 +103,11 @@ def set_start(bounds: Bounds, robot: Robot, scenario: Scenario, initial: State, 
         bounds.lower[name][:, 0] = -np.inf if between else value
         bounds.upper[name][:, 0] = np.inf if between else value
     places = points.reshape(-1, 3).T
-    above = np.repeat(places[2] - heights_below(scenario.surface, places) > _IN_THE_AIR, 3)
-    bounds.lower["contact_forces"][above, 0] = -NO_FORCE
-    bounds.upper["contact_forces"][above, 0] = NO_FORCE
+    heights = places[2] - heights_below(scenario.surface, places)
+    least = 0.5 * scenario.contact_bounds(robot)[0] / np.maximum(heights, _IN_THE_AIR)
+    above, left = np.repeat(heights > _IN_THE_AIR, 3), np.repeat(np.minimum(NO_FORCE, least), 3)
+    bounds.lower["contact_forces"][above, 0] = -left[above]
+    bounds.upper["contact_forces"][above, 0] = left[above]
 
 
 AT_START: Mapping[str, Callable[[Robot, State], Array]] = MappingProxyType(

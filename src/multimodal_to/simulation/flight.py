@@ -48,9 +48,7 @@ class Flight:
         TrajectoryError: the plan is not one of this robot with these jets.
     """
 
-    def __init__(
-        self, robot: Robot, plan: Trajectory, *, push: Push | None = None, torque_limits: bool = True
-    ) -> None:
+    def __init__(self, robot: Robot, plan: Trajectory, *, push: Push | None = None, torque_limits: bool = True) -> None:
         refuse_other_robot(plan, robot, what="the plan", error=TrajectoryError)
         simulation, friction = stage(robot, plan, torque_limits)
         self._robot, self._push = robot, push

@@ -68,9 +68,7 @@ class Ending:
     label: str = ""  # as in `Watch`
     tolerance: float = FEASIBLE  # greatest violation of an answer, in solver units
     statistics: Mapping[str, Any] = field(default_factory=dict)  # whatever the solver has to say of its work
-    facts: Mapping[str, Any] = field(
-        default_factory=dict
-    )  # what a record says otherwise than `Solver.facts`
+    facts: Mapping[str, Any] = field(default_factory=dict)  # what a record says otherwise than `Solver.facts`
 
 
 class Solver(Protocol):
