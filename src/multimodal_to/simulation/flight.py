@@ -72,7 +72,7 @@ class Flight:
 
     @property
     def playback(self) -> Playback:
-        """Return what the simulation has done so far; its `plan` is the first one, its `reference` what was followed."""
+        """Return what the simulation has done; its `plan` is the first one, its `reference` what was followed."""
         return self._player.playback()
 
     def follow(self, plan: Trajectory, since: float) -> None:
@@ -96,7 +96,7 @@ class Flight:
         """
         if not 0.0 <= duration < np.inf:
             raise InputError(f"the duration is {duration} s; expected a number of at least zero")
-        times = self.time + TIME_STEP * np.arange(round(duration / TIME_STEP))
+        times = self.time + TIME_STEP * np.arange(round(duration / TIME_STEP), dtype=np.float64)
         if not times.size:
             return
         force = None

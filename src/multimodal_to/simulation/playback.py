@@ -84,7 +84,7 @@ def play(
     simulation, friction = stage(robot, plan, torque_limits)
     steps = round((plan.duration + HOLD) / TIME_STEP) + 1
     player = Player(simulation, plan, friction, stabilise=stabilise, torque_limits=torque_limits)
-    player.run(reference(robot, plan, TIME_STEP * np.arange(steps), delay))
+    player.run(reference(robot, plan, TIME_STEP * np.arange(steps, dtype=np.float64), delay))
     return player.playback()
 
 
@@ -217,9 +217,9 @@ class Player:
 
     def _state(self) -> dict[str, Array]:
         data, simulation = self._data, self._simulation
-        turn = np.zeros(9)
-        self._mujoco.mju_quat2Mat(turn, data.qpos[3:7])
-        turn = turn.reshape(3, 3)
+        nine = np.zeros(9)
+        self._mujoco.mju_quat2Mat(nine, data.qpos[3:7])
+        turn = nine.reshape(3, 3)
         return {
             "com": data.subtree_com[1].copy(),
             "qpos": np.concatenate([data.qpos[:7], data.qpos[simulation.joint_positions]]),
