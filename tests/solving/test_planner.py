@@ -107,13 +107,14 @@ def test_a_given_start_is_of_the_order_of_the_rule(robot, task, moving):
     assert (coarse - exact) / (fine - exact) == pytest.approx(4.0, rel=0.25)
 
 
-def test_a_plan_started_anew_from_its_own_state_goes_on_as_planned(planned, robot, task):
+def test_a_plan_started_anew_is_the_one_that_a_cold_solve_finds(planned, robot, task):
     planner, first = planned
-    again = planner.solve(initial=mt.state_at(first.trajectory, 0.2), elapsed=0.2)
+    state = mt.state_at(first.trajectory, 0.2)
+    again = planner.solve(initial=state, elapsed=0.2)
+    cold = mt.solve(mt.build(robot, task, initial=state))
     assert again.status is mt.Status.OPTIMAL
-    assert again.iterations < first.iterations
-    ahead = first.trajectory.com_position[:, 1:]
-    assert again.trajectory.com_position[:, : ahead.shape[1]] == pytest.approx(ahead, abs=5e-3)
+    assert again.iterations < 0.7 * cold.iterations
+    assert again.objective == pytest.approx(cold.objective, rel=1e-3)
 
 
 def test_only_bounds_change_from_solve_to_solve(robot, task, moving, monkeypatch):
@@ -140,17 +141,18 @@ def test_bounds_are_those_of_a_problem_built_for_the_task(robot, task, moving):
 def test_a_planner_finds_what_a_problem_built_anew_has(ironcub):
     """Also where posture costs pull to the end's posture, which is another one for another end."""
     stand = replace(
-        mt.scenarios.jump(),
-        knots=8,
+        mt.scenarios.paper("jump"),
+        knots=6,
         mid_height_min=None,
         final_com=(0.0, 0.0, 0.55),
         interval_min=0.1,
         interval_max=0.1,
     )
-    planner = mt.Planner(ironcub, stand)
+    paper = mt.Formulation.paper()
+    planner = mt.Planner(ironcub, stand, paper)
     planner.solve()
     found = planner.solve(final_com=(0.0, 0.0, 0.545))
-    anew = mt.solve(mt.build(ironcub, replace(stand, final_com=(0.0, 0.0, 0.545))))
+    anew = mt.solve(mt.build(ironcub, replace(stand, final_com=(0.0, 0.0, 0.545)), paper))
     assert found.status is mt.Status.OPTIMAL
     assert found.iterations < anew.iterations
     assert found.objective == pytest.approx(anew.objective, rel=1e-4)
@@ -184,7 +186,7 @@ def test_a_state_of_a_motion_has_its_velocities_at_the_instant(planned, robot):
     mean = (trajectory.base_linear_velocity[:, 3] + trajectory.base_linear_velocity[:, 4]) / 2
     assert state.base_linear_velocity == pytest.approx(mean)
     assert state.com(robot) == pytest.approx(trajectory.com_position[:, 3], abs=1e-6)
-    with pytest.raises(InputError, match="the time is 9 s; expected 0 to 2.4 s"):
+    with pytest.raises(InputError, match=r"the time is 9 s; expected 0 to 2\.4 s"):
         mt.state_at(trajectory, 9.0)
 
 

@@ -123,5 +123,6 @@ AT_START: Mapping[str, Callable[[Robot, State], Array]] = MappingProxyType(
 """What the rows of a term are equal to in the first interval, by its name: the velocities at the first knot.
 
 Under leapfrog a velocity is at mid-interval. (v_−½ + v_½) / 2 = v(0) and v_½ = v_−½ + a_0 Δt make
-v_½ = v(0) + ½ a_0 Δt, the half kick of Störmer and Verlet, with the acceleration of the new plan: of order two, as the rule itself.
+v_½ = v(0) + ½ a_0 Δt, the half kick of Störmer and Verlet, with the acceleration of the
+new plan: of order two, as the rule itself.
 """
