@@ -12,6 +12,7 @@ from multimodal_to.doctor import Diagnosis, doctor
 from multimodal_to.errors import MultimodalError
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.models.state import State
 from multimodal_to.models.terrain import FlatGround, HeightField, Plane, Stairs
 from multimodal_to.ocp import (
     Constraint,
@@ -30,8 +31,20 @@ from multimodal_to.ocp import (
 )
 from multimodal_to.scenarios import Margins, Scenario, Start, Terminal, Weights
 from multimodal_to.scenarios import files as scenario_files
-from multimodal_to.solving import Ending, Ipopt, Solution, Solver, StartPoint, Status, Watch, relax, solve
+from multimodal_to.solving import (
+    Ending,
+    Ipopt,
+    Planner,
+    Solution,
+    Solver,
+    StartPoint,
+    Status,
+    Watch,
+    relax,
+    solve,
+)
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.states import state_at
 
 __all__ = [
     "Audit",
@@ -51,6 +64,7 @@ __all__ = [
     "MultimodalError",
     "Parameters",
     "Plane",
+    "Planner",
     "Problem",
     "Robot",
     "Scenario",
@@ -59,6 +73,7 @@ __all__ = [
     "Stairs",
     "Start",
     "StartPoint",
+    "State",
     "Status",
     "Terminal",
     "Trajectory",
@@ -77,4 +92,5 @@ __all__ = [
     "scenario_files",
     "scenarios",
     "solve",
+    "state_at",
 ]

@@ -391,7 +391,7 @@ def _equilibrium(when: str, condition: Judged) -> tuple[Property, ...]:
 
 _TASK = (
     _com("start"),
-    *_rest("start", Judged.WITH_SCENARIO),
+    *_rest("start", Judged.START_AT_REST),
     _standing("start", Judged.STANDING_START),
     Property(
         name="start: thrust",
@@ -402,7 +402,7 @@ _TASK = (
         judged=Judged.STANDING_START,
     ),
     *_hovering("start", Judged.HOVERING_START),
-    *_equilibrium("start", Judged.WITH_SCENARIO),
+    *_equilibrium("start", Judged.START_AT_REST),
     Property(
         name="knots",
         unit="1",

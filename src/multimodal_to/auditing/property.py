@@ -27,6 +27,7 @@ class Judged(Enum):
     WITH_MID_HEIGHT = "the scenario has a `mid_height_min`"
     STANDING_START = "the scenario starts standing"
     HOVERING_START = "the scenario starts in a hover"
+    START_AT_REST = "the scenario starts standing or in a hover"
     END_AT_REST = "the scenario ends standing or in a hover"
     STANDING_END = "the scenario ends standing"
     HOVERING_END = "the scenario ends in a hover"
@@ -48,6 +49,7 @@ class Judged(Enum):
             Judged.WITH_MID_HEIGHT: scenario.mid_height_min is not None,
             Judged.STANDING_START: scenario.start is Start.STANDING,
             Judged.HOVERING_START: scenario.start is Start.HOVER,
+            Judged.START_AT_REST: scenario.start is not Start.GIVEN,
             Judged.END_AT_REST: scenario.terminal in (Terminal.STANDING, Terminal.HOVER),
             Judged.STANDING_END: scenario.terminal is Terminal.STANDING,
             Judged.HOVERING_END: scenario.terminal is Terminal.HOVER,

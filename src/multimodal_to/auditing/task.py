@@ -20,7 +20,10 @@ def task_findings(motion: Motion, scenario: Scenario) -> list[Worst]:
 
 
 def _start(motion: Motion, scenario: Scenario) -> list[Worst]:
-    findings = [_com("start: CoM", motion, 0, scenario.initial_com), *_rest("start", motion, 0)]
+    findings = [_com("start: CoM", motion, 0, scenario.initial_com)]
+    if scenario.start is Start.GIVEN:  # it may move, and nothing has to carry it
+        return findings
+    findings += _rest("start", motion, 0)
     if scenario.start is Start.STANDING:
         findings += [*_standing("start", motion, 0, scenario), _no_thrust(motion)]
     if scenario.start is Start.HOVER:

@@ -28,6 +28,11 @@ class KktStructure:
     inequalities: int
     equalities: int
 
+    def equals(self, other: KktStructure) -> bool:
+        """Return whether another structure says the same."""
+        mine, theirs = ((some.knots, some.inequalities, some.equalities) for some in (self, other))
+        return mine == theirs and np.array_equal(self.variable_knots, other.variable_knots)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Counts:

@@ -6,17 +6,19 @@ import numpy as np
 
 from multimodal_to.models.attitude import signed_like
 from multimodal_to.models.robot import Posture, Robot
+from multimodal_to.models.state import State
+from multimodal_to.ocp import given
 from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.variables import Bounds
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 from multimodal_to.trajectory import rules
 
 _AT_REST = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
-_NO_FORCE = 0.01
-"""Largest contact force component left at a knot that has to be free of contact [N]."""
 
 
-def set_boundary(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture, rule: str) -> None:
+def set_boundary(
+    bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture, rule: str, initial: State | None = None
+) -> None:
     """Hold the first and last knots as the scenario says.
 
     Args:
@@ -25,8 +27,15 @@ def set_boundary(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Pos
         scenario: the task.
         standing: the posture that a motion that starts on its feet starts in.
         rule: name of the integration rule.
+        initial: the state that a motion with a given start starts in.
+
+    Raises:
+        ScenarioError: what is held is outside its range.
     """
-    _set_start(bounds, robot, scenario, standing)
+    if initial is not None:
+        given.set_start(bounds, robot, scenario, initial, rule)
+    else:
+        _set_start(bounds, robot, scenario, standing)
     _set_end(bounds, scenario, rule)
     if scenario.mid_height_min is not None:
         low = bounds.lower["com_position"]
@@ -39,7 +48,7 @@ def _set_start(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Postu
     for name in (*_AT_REST, "com_velocity", "angular_momentum", "thrust_rate"):
         fix(name, 0, 0.0)
     if scenario.start is Start.HOVER:
-        fix("contact_forces", 0, 0.0, within=_NO_FORCE)
+        fix("contact_forces", 0, 0.0, within=given.NO_FORCE)
         return
     fix("base_position", 0, standing.base_position)
     fix("base_quaternion_xyzw", 0, signed_like(standing.base_quaternion_xyzw, robot.upright.base_quaternion_xyzw))
@@ -66,4 +75,4 @@ def _set_end(bounds: Bounds, scenario: Scenario, rule: str) -> None:
             fix("thrust_rate", knot, 0.0)
         # Where velocities are between knots, the forces of the knot before the last one make the last velocity.
         for knot in (last - 1, last) if rules.instant(rule, "com_velocity") else (last,):
-            fix("contact_forces", knot, 0.0, within=_NO_FORCE)
+            fix("contact_forces", knot, 0.0, within=given.NO_FORCE)

@@ -10,8 +10,9 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import FormulationError, listed
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.state import State
+from multimodal_to.ocp import given, rebinding
 from multimodal_to.ocp.formulation import Formulation
-from multimodal_to.ocp.guess import start_guess
 from multimodal_to.ocp.outline import formulate, prepared
 from multimodal_to.ocp.problem import BoundSet, Problem, RowSet
 from multimodal_to.ocp.stages import Held, NamedStage
@@ -20,34 +21,38 @@ from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.scenario import Scenario
 
 
-def build(robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> Problem:
+def build(
+    robot: Robot, scenario: Scenario, formulation: Formulation | None = None, *, initial: State | None = None
+) -> Problem:
     """Return the problem of a scenario for a robot; nothing is solved but the start posture.
 
     Args:
         robot: whose motion it is.
         scenario: the task.
         formulation: what the problem is made of; by default `Formulation.executable()`.
+        initial: the state to start in, for a scenario whose start is `Start.GIVEN`; its CoM becomes `initial_com`.
 
     Raises:
-        ScenarioError: the scenario contradicts itself or does not fit the robot.
+        ScenarioError: the scenario contradicts itself or does not fit the robot, or its start lacks a state.
+        InputError: there is a state for a scenario with another start, or it is of another robot.
         FormulationError: a term does not return what it has to, or is not a number at the start guess.
     """
     formulation = formulation or Formulation.executable()
     robot, standing = prepared(robot, scenario)
-    outline = formulate(robot, scenario, standing, formulation)
+    given.check(robot, scenario, initial)
+    scenario = rebinding.started(robot, scenario, initial)
+    outline = formulate(robot, scenario, standing, formulation, initial)
     layout = outline.layout
     stages = [named.stage for named in outline.stages]
     nlp = assemble(stages, layout.size, scenario.knots)
 
     scale = np.append(np.tile(layout.scale, scenario.knots + 1), formulation.interval_scale)
-    lower, upper, box_lower, box_upper = (
-        np.append(np.concatenate([side[name] for name in layout.rows]).ravel(order="F"), limit) / scale
-        for bounds in (outline.bounds, outline.box)
-        for side, limit in ((bounds.lower, scenario.interval_min), (bounds.upper, scenario.interval_max))
-    )
+    lower, upper = rebinding.stacked(outline.bounds, layout, scenario, scale)
+    box_lower, box_upper = rebinding.stacked(outline.box, layout, scenario, scale)
     row_lower, row_upper, rows = _row_bounds(outline.stages)
-    middle = 0.5 * (scenario.interval_min + scenario.interval_max)
-    guess = np.append(start_guess(robot, scenario, standing, layout).ravel(order="F"), middle) / scale
+    if initial is not None:
+        rebinding.hold_rows(row_lower, row_upper, rows, robot, initial)
+    guess = rebinding.guessed(robot, scenario, initial.posture if initial else standing, layout, scale)
     problem = Problem(
         robot=robot,
         scenario=scenario,
@@ -65,6 +70,8 @@ def build(robot: Robot, scenario: Scenario, formulation: Formulation | None = No
         bound_rows=_bound_sets(outline.held, layout),
         cost_names=tuple(name for named in outline.stages for name in named.cost_names),
         guess=np.clip(guess, lower, upper),
+        parameters=outline.parameters,
+        initial=initial,
         scale=scale,
     )
     _refuse_no_numbers(problem, outline.stages)

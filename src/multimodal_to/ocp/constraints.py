@@ -130,6 +130,28 @@ def off_upright(knot: Knot, parameters: Parameters) -> SX:
 # -------------------------------------------------------------------- over an interval
 
 
+def momentum_at_start(interval: Interval, parameters: Parameters) -> SX:
+    """ẋ and hω at the instant of the first knot, under leapfrog: the means of v_−½ and v_½."""
+    knot = interval.at_accelerations
+    return cs.vertcat(knot.com_velocity, knot.angular_momentum)
+
+
+def base_twist_at_start(interval: Interval, parameters: Parameters) -> SX:
+    """ṗ and ω at the instant of the first knot, under leapfrog: the means of v_−½ and v_½."""
+    knot = interval.at_accelerations
+    return cs.vertcat(knot.base_linear_velocity, knot.base_angular_velocity)
+
+
+def joint_velocities_at_start(interval: Interval, parameters: Parameters) -> SX:
+    """ṡ at the instant of the first knot, under leapfrog: the mean of v_−½ and v_½."""
+    return interval.at_accelerations.joint_velocities
+
+
+def thrust_rate_at_start(interval: Interval, parameters: Parameters) -> SX:
+    """Ṫ at the instant of the first knot, under leapfrog: the mean of v_−½ and v_½."""
+    return interval.at_accelerations.thrust_rate
+
+
 def momentum_dynamics(interval: Interval, parameters: Parameters) -> SX:
     """m (ẋ⁺ − ẋ) = Δt (m g + Σ f⁺) and hω⁺ − hω = Δt Σ (p⁺ − x⁺) × f⁺ (eq. 14 with gravity, 24a, 24c)."""
     mass = parameters.robot.mass

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from multimodal_to.errors import FormulationError, listed, shown, unknown
 from multimodal_to.ocp import margins, paper
@@ -70,13 +71,13 @@ class Formulation:
         """Return the costs, in order."""
         return tuple(term for term in self.terms if isinstance(term, Cost))
 
-    @property
+    @cached_property
     def own_terms(self) -> tuple[str, ...]:
         """Return the names of the terms that `of_rule` does not have for this rule."""
         usual = self._usual.terms
         return tuple(term.name for term in self.terms if term not in usual)
 
-    @property
+    @cached_property
     def left_out(self) -> tuple[str, ...]:
         """Return the names of the terms that `of_rule` has for this rule and that are not among these."""
         mine = {term.name for term in self.terms}

@@ -164,7 +164,7 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     stands = contact_positions(robot, standing).reshape(-1, 3, 1)
     points = stands + moved
     points[:, 2] += _ground(scenario, points) - _ground(scenario, stands)
-    if scenario.start is Start.HOVER:
+    if scenario.start is not Start.STANDING:
         points[:, 2] = np.maximum(points[:, 2], (stands + away)[:, 2])  # the feet fly along
     if scenario.mid_height_min is not None and not robot.jets:
         rise, speed = hop(robot, scenario, view["com_position"][2])
@@ -197,7 +197,7 @@ def hop(robot: Robot, scenario: Scenario, heights: Array) -> tuple[Array, Array]
 def _progress(scenario: Scenario) -> Array:
     """Return which share of the way is behind the robot at every knot, (N + 1,); one that lands is there early."""
     share = np.linspace(0.0, 1.0, scenario.knots + 1)
-    lands = scenario.start is Start.HOVER and scenario.terminal is Terminal.STANDING
+    lands = scenario.start is not Start.STANDING and scenario.terminal is Terminal.STANDING
     return np.minimum(share / LANDED, 1.0) if lands else share
 
 
@@ -210,7 +210,7 @@ def _weight_flown(robot: Robot, scenario: Scenario) -> Array:
     share = np.linspace(0.0, 1.0, scenario.knots + 1)
     if not robot.jets:
         return np.zeros_like(share)
-    if scenario.start is Start.HOVER:
+    if scenario.start is not Start.STANDING:
         lands = scenario.terminal is Terminal.STANDING
         return np.minimum((1.0 - share) / (1.0 - LANDED), 1.0) if lands else np.ones_like(share)
     return share if scenario.terminal is Terminal.HOVER and scenario.guess_steps else np.zeros_like(share)

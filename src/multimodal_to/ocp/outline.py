@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from multimodal_to.errors import FormulationError, ScenarioError, listed
 from multimodal_to.models.robot import Posture, Robot
+from multimodal_to.models.state import State
+from multimodal_to.ocp import given
 from multimodal_to.ocp.boundary import set_boundary
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.guess import standing_posture
@@ -25,6 +27,8 @@ class Outline:
     box: Bounds  # without the terms that are bounds
     stages: list[NamedStage]
     held: list[Held]  # the rows that are bounds
+    parameters: Parameters  # what its terms have read
+    initial: State | None  # that a motion with a given start starts in
 
     def terms_that_hold(self, variable: str, row: int, knot: int) -> tuple[str, ...]:
         """Return the names of the terms that are bounds of one row of a variable at a knot.
@@ -39,7 +43,9 @@ class Outline:
         )
 
 
-def formulate(robot: Robot, scenario: Scenario, standing: Posture, formulation: Formulation) -> Outline:
+def formulate(
+    robot: Robot, scenario: Scenario, standing: Posture, formulation: Formulation, initial: State | None = None
+) -> Outline:
     """Return the outline of a problem.
 
     Args:
@@ -47,6 +53,7 @@ def formulate(robot: Robot, scenario: Scenario, standing: Posture, formulation: 
         scenario: the task.
         standing: posture in which the motion starts or, if it starts in the air, that it is pulled to.
         formulation: what the problem is made of.
+        initial: the state that a motion with a given start starts in.
 
     Raises:
         ScenarioError: what the start or the end holds is outside its range.
@@ -56,14 +63,17 @@ def formulate(robot: Robot, scenario: Scenario, standing: Posture, formulation: 
     box = ranges(robot, scenario, layout)
     bounds = box.copy()
     parameters = Parameters.of(robot, scenario, standing, _target(robot, scenario, standing))
+    given.check(robot, scenario, initial)
     stages, held = collect(formulation, parameters, layout, bounds)
-    set_boundary(box, robot, scenario, standing, formulation.rule.name)
+    set_boundary(box, robot, scenario, standing, formulation.rule.name, initial)
     try:
-        set_boundary(bounds, robot, scenario, standing, formulation.rule.name)
+        set_boundary(bounds, robot, scenario, standing, formulation.rule.name, initial)
     except ScenarioError as error:  # without the terms it fits, as the line before has shown
         terms = dict.fromkeys(some.term for some in held if _contradicts(some, box, layout))
         raise FormulationError(f"the term '{listed(terms)}' contradicts the start or the end: {error}") from error
-    return Outline(layout=layout, bounds=bounds, box=box, stages=stages, held=held)
+    return Outline(
+        layout=layout, bounds=bounds, box=box, stages=stages, held=held, parameters=parameters, initial=initial
+    )
 
 
 def _contradicts(held: Held, box: Bounds, layout: Layout) -> bool:

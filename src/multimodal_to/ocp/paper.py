@@ -50,6 +50,14 @@ def _hovers_first(parameters: Parameters) -> bool:
     return parameters.scenario.start is Start.HOVER
 
 
+def _starts_given(parameters: Parameters) -> bool:
+    return parameters.scenario.start is Start.GIVEN
+
+
+def _starts_at_rest(parameters: Parameters) -> bool:
+    return parameters.scenario.start is not Start.GIVEN
+
+
 def _hovers_last(parameters: Parameters) -> bool:
     return parameters.scenario.terminal is Terminal.HOVER
 
@@ -128,6 +136,7 @@ STATIC_EQUILIBRIUM = Constraint(
     holds=Where.FIRST_KNOT,
     scale=FORCE,
     labels=TWIST,
+    when=_starts_at_rest,
 )
 STEADY_THRUST = Constraint(
     value=constraints.steady_thrust,
@@ -230,8 +239,53 @@ FINAL_STEADY_THRUST = Constraint(
     labels=_each("jet"),
     when=_hovers_last,
 )
-LEAPFROG = (COMPLEMENTARITY_BEFORE, COMPLEMENTARITY_AFTER, SLIDING_AFTER, FINAL_EQUILIBRIUM, FINAL_STEADY_THRUST)
-"""What leapfrog asks for beside: a force acts half an interval before and after its knot, and none follows the last."""
+MOMENTUM_AT_START = Constraint(
+    value=constraints.momentum_at_start,
+    within=equal(),  # to what the given state says, as `ocp.given` has it; so do the next three
+    unit=("m/s", "m/s", "m/s", "kg m²/s", "kg m²/s", "kg m²/s"),
+    holds=Where.FIRST_INTERVAL,
+    labels=TWIST,
+    when=_starts_given,
+)
+BASE_TWIST_AT_START = Constraint(
+    value=constraints.base_twist_at_start,
+    within=equal(),
+    unit=("m/s", "m/s", "m/s", "rad/s", "rad/s", "rad/s"),
+    holds=Where.FIRST_INTERVAL,
+    labels=TWIST,
+    when=_starts_given,
+)
+JOINT_VELOCITIES_AT_START = Constraint(
+    value=constraints.joint_velocities_at_start,
+    within=equal(),
+    unit="rad/s",
+    holds=Where.FIRST_INTERVAL,
+    labels=_each("joint"),
+    when=_starts_given,
+)
+THRUST_RATE_AT_START = Constraint(
+    value=constraints.thrust_rate_at_start,
+    within=equal(),
+    unit="N/s",
+    holds=Where.FIRST_INTERVAL,
+    scale=FORCE,
+    labels=_each("jet"),
+    when=_starts_given,
+)
+LEAPFROG = (
+    COMPLEMENTARITY_BEFORE,
+    COMPLEMENTARITY_AFTER,
+    SLIDING_AFTER,
+    FINAL_EQUILIBRIUM,
+    FINAL_STEADY_THRUST,
+    MOMENTUM_AT_START,
+    BASE_TWIST_AT_START,
+    JOINT_VELOCITIES_AT_START,
+    THRUST_RATE_AT_START,
+)
+"""What leapfrog asks for beside: a force acts half an interval before and after its knot, and none follows the last;
+the velocities of a given state are the means of those before and after it.
+"""
 
 CONSTRAINTS = (
     UNIT_QUATERNION,

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.state import State
 from multimodal_to.ocp.formulation import Formulation
+from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.transcription import Nlp
 from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.scenario import Scenario
@@ -74,6 +76,8 @@ class Problem:
     bound_rows: dict[str, BoundSet]  # terms, or parts of them, that are bounds of variables
     cost_names: tuple[str, ...]  # in the order of nlp.costs; a name may occur more than once
     guess: Array  # of x
+    parameters: Parameters = field(repr=False)  # what the terms have read
+    initial: State | None = field(repr=False, default=None)  # that a motion with a given start starts in
     scale: Array = field(repr=False)  # of x
 
     def start_from(self, trajectory: Trajectory) -> Array:

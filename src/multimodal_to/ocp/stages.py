@@ -91,6 +91,13 @@ def collect(
             knots=first,
         ),
         _Place(
+            name="first_interval",
+            at={Where.FIRST_INTERVAL: interval},
+            variables=z_next,
+            starts=first,
+            knots=first + 1,
+        ),
+        _Place(
             name="every",
             at={Where.LATER_KNOTS: end, Where.EVERY_KNOT: end, Where.EVERY_INTERVAL: interval},
             variables=z_next,

@@ -56,15 +56,16 @@ class Where(Enum):
     FIRST_KNOT = "first knot"
     LATER_KNOTS = "every knot but the first"
     EVERY_KNOT = "every knot"
-    """The first one only where the motion starts in the air: a standing start gives the whole posture."""
+    """The first one only where the motion starts in a hover: else the start gives the whole posture."""
     LAST_KNOT = "last knot"
     EVERY_INTERVAL = "every interval"
     LAST_INTERVAL = "last interval"
+    FIRST_INTERVAL = "first interval"
 
     @property
     def of_intervals(self) -> bool:
         """Return whether a term there is a function of an interval."""
-        return self in (Where.EVERY_INTERVAL, Where.LAST_INTERVAL)
+        return self in (Where.EVERY_INTERVAL, Where.LAST_INTERVAL, Where.FIRST_INTERVAL)
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,8 @@ class Start(Enum):
     """In a posture near home with every contact point on the ground, held by contact forces; jets idle."""
     HOVER = "hover"
     """At rest in the air, in a posture that is found: no contact force, steady thrusts carry the weight."""
+    GIVEN = "given"
+    """In a state that `build` or a `Planner` is given, moving or not; `initial_com` is replaced by its CoM."""
 
 
 class Terminal(Enum):

@@ -1,13 +1,16 @@
 """A second opinion: a plan in MuJoCo, which shares no code with the problem that was solved."""
 
 from multimodal_to.simulation.agreement import by_mujoco, by_rnea, disagreement, random_states, states_along
+from multimodal_to.simulation.flight import Flight, Push
 from multimodal_to.simulation.model import SimulationModel, build_model
 from multimodal_to.simulation.playback import Playback, play
 from multimodal_to.simulation.report import JointTorque, Switch, Tracking, simulated_trajectory, tracking
 
 __all__ = [
+    "Flight",
     "JointTorque",
     "Playback",
+    "Push",
     "SimulationModel",
     "Switch",
     "Tracking",

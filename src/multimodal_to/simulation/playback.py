@@ -17,6 +17,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError, TrajectoryError
 from multimodal_to.models.jet import Jet
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.state import State
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.scenarios.data import stored
 from multimodal_to.simulation.model import DAMPING, STIFFNESS, TIME_STEP, SimulationModel, build_model, mujoco_module
@@ -83,6 +84,21 @@ def play(
         raise InputError(f"the delay is {delay:g} intervals; expected 0 to 1")
     refuse_other_robot(plan, robot, what="the plan", error=TrajectoryError)
     robot = under_conditions(robot, plan)
+    simulation, friction = stage(robot, plan, torque_limits)
+    steps = round((plan.duration + HOLD) / TIME_STEP) + 1
+    player = Player(simulation, plan, friction, stabilise=stabilise, torque_limits=torque_limits)
+    player.run(reference(robot, plan, TIME_STEP * np.arange(steps, dtype=np.float64), delay))
+    return player.playback()
+
+
+def stage(robot: Robot, plan: Trajectory, torque_limits: bool) -> tuple[SimulationModel, float]:
+    """Return a robot on the ground of the scenario that a plan keeps, and its friction [1].
+
+    Args:
+        robot: that moves.
+        plan: its motion.
+        torque_limits: clip the torque of each joint's motor at its effort limit.
+    """
     scenario = stored(plan)
     friction = robot.friction if scenario is None or scenario.friction is None else scenario.friction
     low, high = (getattr(plan.com_position[:2], end)(axis=1) for end in ("min", "max"))
@@ -94,72 +110,120 @@ def play(
         reach=float((high - low).max()) / 2.0 + REACH,
         torque_limits=torque_limits,
     )
-    return _Player(simulation, plan, friction, stabilise, delay, torque_limits).run()
+    return simulation, friction
 
 
-class _Player:
-    """A simulation that runs, with everything that changes as it does."""
+class Player:
+    """A simulation that runs, with everything that changes as it does.
+
+    Args:
+        simulation: the robot on its ground.
+        plan: at whose first knot it starts.
+        friction: Coulomb's μ [1].
+        stabilise: let the stabiliser correct thrusts, contact forces and joints.
+        torque_limits: whether the simulation clips torques.
+    """
 
     def __init__(
         self,
         simulation: SimulationModel,
         plan: Trajectory,
         friction: float,
-        stabilise: bool,
-        delay: float,
-        torque_limits: bool,
+        *,
+        stabilise: bool = True,
+        torque_limits: bool = True,
     ) -> None:
         self._mujoco = mujoco_module()
         self._simulation, self._plan, self._robot = simulation, plan, simulation.robot
         self._friction, self._stabilise, self._torque_limits = friction, stabilise, torque_limits
         self._data = self._mujoco.MjData(simulation.model)
-        self._time: Array = np.asarray(
-            TIME_STEP * np.arange(round((plan.duration + HOLD) / TIME_STEP) + 1), dtype=float
-        )
-        self._reference = reference(self._robot, plan, self._time, delay)
+        self._rows = list[dict[str, Array]]()
+        self._reference: Reference
+        self._followed = list[Reference]()
+        self._down: float | None = None
         self._inertia = _inertia(self._robot)
         self._thrust, self._rate = plan.thrust[:, 0].copy(), plan.thrust_rate[:, 0].copy()
         self._throttle, self._shift = plan.throttle[:, 0].copy(), np.zeros(len(self._robot.joint_names))
         self._correction, self._borne = Correction.none(self._robot), np.zeros(len(self._robot.joint_names))
 
-    def run(self) -> Playback:
-        plan, data, model = self._plan, self._data, self._simulation.model
         velocity = np.concatenate([plan.base_linear_velocity[:, 0], plan.base_angular_velocity[:, 0]])
         self._simulation.set_state(
-            data,
+            self._data,
             plan.base_position[:, 0],
             plan.base_quaternion_xyzw[:, 0],
             plan.joint_positions[:, 0],
             velocity,
             plan.joint_velocities[:, 0],
         )
-        rows: list[dict[str, Array]] = []
-        for step in range(self._time.size):
+
+    @property
+    def steps(self) -> int:
+        """Return how many steps have been done."""
+        return len(self._rows)
+
+    @property
+    def fell(self) -> float | None:
+        """Return when the robot fell [s], if it did."""
+        return self._down
+
+    def run(self, wanted: Reference, force: Array | None = None) -> None:
+        """Follow a reference for as many steps as it has rows; a robot that has fallen stays as it is.
+
+        Args:
+            wanted: a row for each of the next steps.
+            force: on the base link at its CoM, in world axes, for each of these steps [N], (steps, 3).
+        """
+        data, model = self._data, self._simulation.model
+        self._reference = wanted
+        self._followed.append(wanted)
+        for step in range(wanted.com.shape[0]):
+            if self._down is not None:
+                self._rows.append(self._rows[-1])
+                continue
+            data.xfrc_applied[1, :3] = 0.0 if force is None else force[step]
             self._mujoco.mj_step1(model, data)
-            rows.append(self._state())
-            if self._stabilise and step % PERIOD == 0:
+            row = self._state()
+            if self._stabilise and self.steps % PERIOD == 0:
                 self._decide(step)
-            rows[-1] |= self._control(step)
+            row |= self._control(step)
             self._mujoco.mj_step2(model, data)
-            rows[-1] |= {"contact_forces": self._contact_forces(), "torques": self._torques()}
+            row |= {"contact_forces": self._contact_forces(), "torques": self._torques()}
+            self._rows.append(row)
             if self._is_down(step):
-                break
-        fell = None if len(rows) == self._time.size else float(self._time[len(rows) - 1])
-        rows += [rows[-1]] * (self._time.size - len(rows))
+                self._down = TIME_STEP * (self.steps - 1)
+
+    def playback(self) -> Playback:
+        """Return what the simulation has done so far."""
         return Playback(
             robot=self._robot,
-            plan=plan,
-            reference=self._reference,
-            time=self._time,
-            fell=fell,
+            plan=self._plan,
+            reference=Reference.joined(self._followed),
+            time=TIME_STEP * np.arange(self.steps, dtype=np.float64),
+            fell=self._down,
             torque_limits=self._torque_limits,
             notes=self._simulation.notes,
-            **{name: np.array([row[name] for row in rows]) for name in rows[0]},
+            **{name: np.array([row[name] for row in self._rows]) for name in self._rows[0]},
+        )
+
+    def state(self) -> State:
+        """Return the state of the robot now."""
+        now = self._state()
+        return State(
+            base_position=now["qpos"][:3],
+            base_quaternion_xyzw=now["qpos"][[4, 5, 6, 3]],
+            joint_positions=now["qpos"][7:],
+            base_linear_velocity=now["qvel"][:3],
+            base_angular_velocity=now["qvel"][3:6],
+            joint_velocities=now["qvel"][6:],
+            thrust=now["thrust"],
+            thrust_rate=now["thrust_rate"],
         )
 
     def _state(self) -> dict[str, Array]:
         data, simulation = self._data, self._simulation
-        turn = data.xmat[1].reshape(3, 3)
+        nine = np.zeros(9)
+        self._mujoco.mju_quat2Mat(nine, data.qpos[3:7])
+        turn = nine.reshape(3, 3)
         return {
             "com": data.subtree_com[1].copy(),
             "qpos": np.concatenate([data.qpos[:7], data.qpos[simulation.joint_positions]]),

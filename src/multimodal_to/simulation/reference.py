@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -28,6 +29,13 @@ class Reference:
     thrust: Array  # T [N], (steps, jets)
     thrust_rate: Array  # Ṫ [N/s], (steps, jets)
     throttle: Array  # u [%], (steps, jets)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Reference]) -> Reference:
+        """Return references that follow one another as one."""
+        return cls(
+            **{entry.name: np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(cls)}
+        )
 
 
 def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) -> Reference:
@@ -87,5 +95,6 @@ def reference(robot: Robot, plan: Trajectory, times: Array, delay: float = 0.0) 
 
 def _rotations(plan: Trajectory, times: Array) -> Array:
     """Return the base's rotation at times since the start, that of start and end before and after, (steps, 3, 3)."""
-    distinct, places = np.unique(np.clip(plan.time[0] + times, plan.time[0], plan.time[-1]), return_inverse=True)
-    return np.asarray(base_poses(resample(plan, distinct))[places, :3, :3])
+    wanted = np.clip(plan.time[0] + times, plan.time[0], plan.time[-1])
+    distinct = np.unique([*wanted, plan.time[0], plan.time[-1]])
+    return np.asarray(base_poses(resample(plan, distinct))[np.searchsorted(distinct, wanted), :3, :3])

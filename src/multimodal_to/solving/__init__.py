@@ -1,6 +1,7 @@
 """How a problem is solved, and what came out of it."""
 
 from multimodal_to.solving.ipopt import Ipopt
+from multimodal_to.solving.planner import Planner
 from multimodal_to.solving.relaxation import Relaxation, relax
 from multimodal_to.solving.solution import Iterate, Solution, solve
 from multimodal_to.solving.solver import Ending, Solver, StartPoint, Watch
@@ -11,6 +12,7 @@ __all__ = [
     "Ending",
     "Ipopt",
     "Iterate",
+    "Planner",
     "Relaxation",
     "Solution",
     "Solver",

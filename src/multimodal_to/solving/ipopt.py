@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
@@ -77,7 +79,7 @@ class Ipopt:
     where the start guess has them.
     """
     barrier_start: float = 0.1
-    barrier_warm: float = 1e-3  # where a solve that starts from an answer begins
+    barrier_warm: float = 1e-4  # where a solve that starts from an answer begins
     linear_solver: str = linear_solvers.AUTO
     """What factorises, one of `linear_solvers.LINEAR_SOLVERS`: by default the native library's `"stages"`, or MUMPS."""
     hsl_library: str = ""  # file of the HSL library; empty: looked for
@@ -156,8 +158,9 @@ class Ipopt:
             which = passes[0]
             seconds = max(self.time_limit - (time.perf_counter() - started), 1e-3)
             options = solver.options(max(self.max_iterations - iterations, 1), seconds, which)
-            with stages.offered(options, stages.structure_of(problem)) as structured:
-                end, statistics = _run(problem, x, options, _Watcher(problem, watch, iterations, which))
+            with stages.offered(options, stages.structure_of(problem), start.kept) as structured:
+                with nullcontext() if structured else machine.memory_kept():
+                    end, statistics = _run(problem, x, options, _Watcher(problem, watch, iterations, which))
                 failure = stages.failure(structured, str(statistics["return_status"]))
             iterations += int(statistics["iter_count"])
             if failure:  # the same pass once more
@@ -192,7 +195,6 @@ def _passes(start: StartPoint) -> tuple[Pass, ...]:
 
 
 @machine.one_blas_thread()
-@machine.memory_kept()
 def _run(problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher) -> tuple[Array, dict[str, Any]]:
     """Run IPOPT once from x; return where it ended, answer or not, and its statistics."""
     nlp, symbol = problem.nlp, cs.MX.sym("x", problem.lower.size)
@@ -222,6 +224,10 @@ def _run(problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Wa
     return np.array(ended["x"]).ravel(), statistics
 
 
+_SHOWN = tuple(cs.nlpsol_out(index) for index in range(cs.nlpsol_n_out()))
+"""What CasADi shows of an iterate, in its order."""
+
+
 class _Watcher(cs.Callback):  # type: ignore[misc]
     """CasADi's iteration callback: shows every iterate to `watch`, and stops the pass when asked."""
 
@@ -247,23 +253,26 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
         sizes = {"f": 1, "x": variables, "lam_x": variables, "g": rows, "lam_g": rows, "lam_p": 0}
         return cs.Sparsity.dense(sizes.get(cs.nlpsol_out(index), 0), 1)
 
-    def eval(self, arguments: list[Any]) -> list[int]:
+    def has_eval_buffer(self) -> bool:
+        return True
+
+    def eval_buffer(self, arguments: Sequence[Any], results: Sequence[Any]) -> int:
         try:
             self.stopped = self._show(arguments)
         except KeyboardInterrupt:  # the second Ctrl-C
             self.stopped = True
         except Exception as error:  # it is raised once the solver has returned
             self.error, self.stopped = error, True
-        return [int(self.stopped)]
+        np.frombuffer(results[0])[0] = float(self.stopped)
+        return 0
 
-    def _show(self, arguments: list[Any]) -> bool:
-        values = dict(zip((cs.nlpsol_out(index) for index in range(len(arguments))), arguments, strict=True))
-        x = values["x"].full().ravel()
+    def _show(self, arguments: Sequence[Any]) -> bool:
+        x, objective, rows = (np.array(np.frombuffer(arguments[_SHOWN.index(name)])) for name in ("x", "f", "g"))
         self._iteration += 1
         return self._watch(
             x,
             iteration=self._iteration - 1,
-            rows=values["g"].full().ravel(),
-            objective=float(values["f"]),
+            rows=rows,
+            objective=float(objective[0]),
             label=self.which.value,
         )

@@ -21,6 +21,11 @@ _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS
 
 def versions() -> dict[str, str]:
     """Return the versions of this library and of what it solves with, by name, as far as they are known."""
+    return dict(_versions())
+
+
+@cache
+def _versions() -> dict[str, str]:
     found = {
         "multimodal-to": metadata.version("multimodal-to"),
         "casadi": str(cs.CasadiMeta.version()),

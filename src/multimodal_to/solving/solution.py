@@ -94,10 +94,33 @@ def solve(
         TrajectoryError: what the start says of how it was solved is no JSON object.
         SolverError: the solver could not be run, or its linear solver is not here.
     """
-    solver, started = solver or Ipopt(), time.perf_counter()
     point = StartPoint(x=problem.guess)
     if start is not None:
         point = StartPoint(x=problem.start_from(start), record=start.solve_record())
+    return solve_from(problem, solver or Ipopt(), point, progress, checkpoint=checkpoint)
+
+
+def solve_from(
+    problem: Problem,
+    solver: Solver,
+    point: StartPoint,
+    progress: Progress | None = None,
+    *,
+    checkpoint: str | os.PathLike[str] | None = None,
+) -> Solution:
+    """Solve a problem from values of its variables; `solve` says the rest.
+
+    Args:
+        problem: from `build`.
+        solver: what minimises.
+        point: where it starts.
+        progress: told of every iteration; it may stop the solve by returning True.
+        checkpoint: a trajectory file to keep the best iterate in while the solve runs.
+
+    Raises:
+        SolverError: the solver could not be run, or its linear solver is not here.
+    """
+    started = time.perf_counter()
     environment = _environment(problem, solver)
     best = Best(problem, None if checkpoint is None else Checkpoint(checkpoint, environment))
     if point.record is not None:

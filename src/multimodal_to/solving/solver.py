@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.ocp.problem import Problem
+from multimodal_to.solving.stages import KeptStages
 from multimodal_to.solving.status import Status
 
 FEASIBLE = 1e-5
@@ -21,6 +22,8 @@ class StartPoint:
     x: Array  # all variables, in solver units, within their bounds
     record: Mapping[str, Any] | None = None
     """How the motion behind x was solved, as its file says; None where x is the start guess."""
+    kept: KeptStages | None = None
+    """What `Ipopt` keeps of its linear solver from solve to solve; None where nothing is kept."""
 
     @property
     def label(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -50,13 +51,45 @@ def structure(knots: NDArray[np.int32], lower: Array, upper: Array, row_lower: A
     )
 
 
+class KeptStages:
+    """The structured solver of a problem, kept from solve to solve for as long as its matrix has the same structure.
+
+    What it found out about the matrix stays, and so does its memory.
+    """
+
+    def __init__(self) -> None:
+        self._solver: StageSolver | None = None
+        self._structure: KktStructure | None = None
+
+    def of(self, library: ctypes.CDLL, structure: KktStructure) -> StageSolver:
+        """Return the solver of a structure: the one that is there if it is of that structure, else a new one.
+
+        A solver that refused a matrix is replaced as well.
+        """
+        known = self._solver
+        if known is None or self._structure is None or known.refusal or not structure.equals(self._structure):
+            self.close()
+            self._solver, self._structure = StageSolver(library, structure), structure
+        assert self._solver is not None
+        return self._solver
+
+    def close(self) -> None:
+        """Give the memory back."""
+        if self._solver is not None:
+            self._solver.close()
+        self._solver = self._structure = None
+
+
 @contextmanager
-def offered(options: Mapping[str, Any], structure: KktStructure) -> Iterator[StageSolver | None]:
+def offered(
+    options: Mapping[str, Any], structure: KktStructure, kept: KeptStages | None = None
+) -> Iterator[StageSolver | None]:
     """Let the solve of IPOPT that begins in this thread use the structured solver, where its options ask for it.
 
     Args:
         options: of IPOPT.
         structure: of its KKT matrix.
+        kept: where the solver of the solve before is, and where this one stays; else it goes when the solve ends.
 
     Yields:
         The solver, or None where the options ask for another one.
@@ -64,6 +97,11 @@ def offered(options: Mapping[str, Any], structure: KktStructure) -> Iterator[Sta
     library = native.library()
     if library is None or options.get("hsllib") != library._name:
         yield None
+        return
+    if kept is not None:
+        solver = kept.of(library, structure)
+        with solver.announced():
+            yield solver
         return
     with StageSolver(library, structure) as solver, solver.announced():
         yield solver

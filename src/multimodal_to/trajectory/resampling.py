@@ -26,7 +26,7 @@ def resample(trajectory: Trajectory, times: Array) -> Trajectory:
     wanted, grid = np.asarray(times, dtype=float), trajectory.time
     if wanted.size and not (grid[0] <= wanted.min() and wanted.max() <= grid[-1]):
         raise InputError(f"times from {wanted.min():g} to {wanted.max():g} s; expected {grid[0]:g} to {grid[-1]:g} s")
-    arrays: dict[str, Any] = {name: _at(trajectory, name, wanted) for name in QUANTITIES}
+    arrays: dict[str, Any] = {name: at_times(trajectory, name, wanted) for name in QUANTITIES}
     rule = trajectory.rule if rules.all_at_knots(trajectory.rule) else rules.SAMPLED
     return replace(trajectory, time=wanted, rule=rule, **arrays)
 
@@ -40,11 +40,11 @@ def regrid(trajectory: Trajectory, knots: int, rule: str) -> Trajectory:
         rule: name of the integration rule.
     """
     grid = np.linspace(trajectory.time[0], trajectory.time[-1], knots + 1)
-    arrays: dict[str, Any] = {name: _at(trajectory, name, rules.instants(grid, rule, name)) for name in QUANTITIES}
+    arrays: dict[str, Any] = {name: at_times(trajectory, name, rules.instants(grid, rule, name)) for name in QUANTITIES}
     return replace(trajectory, time=grid, rule=rule, **arrays)
 
 
-def _at(trajectory: Trajectory, name: str, times: Array) -> Array:
+def at_times(trajectory: Trajectory, name: str, times: Array) -> Array:
     """Return a quantity at times [s]; before its first instant and after its last it is what it is there."""
     values = getattr(trajectory, name)
     own = trajectory.times(name)

@@ -1,0 +1,129 @@
+"""A motion that starts in a given state: what its first knot holds, and what its first interval is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+
+import numpy as np
+
+from multimodal_to.adam.spatial import Array
+from multimodal_to.errors import InputError, ScenarioError
+from multimodal_to.models.attitude import signed_like
+from multimodal_to.models.robot import Robot
+from multimodal_to.models.state import State
+from multimodal_to.models.terrain import heights_below
+from multimodal_to.ocp.guess import contact_positions
+from multimodal_to.ocp.variables import Bounds
+from multimodal_to.scenarios.scenario import Scenario, Start
+from multimodal_to.trajectory import rules
+
+NO_FORCE = 0.01
+"""Largest contact force component left at a knot that has to be free of contact [N]."""
+_IN_THE_AIR = 1e-3
+"""A contact point of the given state that is higher than this bears no force at the first knot [m]."""
+
+
+def check(robot: Robot, scenario: Scenario, initial: State | None) -> None:
+    """Make sure that there is a state where the scenario starts in one, and nowhere else.
+
+    Raises:
+        ScenarioError: the start is a given one and there is no state.
+        InputError: there is a state and the start is another one, or the state is of another robot.
+    """
+    if initial is None:
+        if scenario.start is Start.GIVEN:
+            raise ScenarioError(
+                f"'{scenario.name}' starts in a given state, and none is given; expected `initial` of `build` or of "
+                "`Planner.solve`, or a start that is 'standing' or 'hover'"
+            )
+        return
+    if scenario.start is not Start.GIVEN:
+        raise InputError(
+            f"a state to start in is given, but '{scenario.name}' starts in '{scenario.start.value}'; expected a "
+            "scenario with start 'given'"
+        )
+    initial.refuse_other_robot(robot)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Kinematics:
+    """What follows from a state."""
+
+    com: Array  # [m], (3,)
+    momentum: Array  # velocity of the CoM [m/s] and angular momentum about it [kg m²/s], (6,)
+    points: Array  # of contact, one after the other [m], (3 contacts,)
+
+
+@lru_cache(maxsize=4)
+def _kinematics(robot: Robot, initial: State) -> _Kinematics:
+    return _Kinematics(
+        com=initial.com(robot),
+        momentum=np.concatenate(initial.momentum(robot)),
+        points=contact_positions(robot, initial.posture),
+    )
+
+
+def com(robot: Robot, initial: State) -> Array:
+    """Return where the CoM is in a state [m], (3,)."""
+    return _kinematics(robot, initial).com
+
+
+def set_start(bounds: Bounds, robot: Robot, scenario: Scenario, initial: State, rule: str) -> None:
+    """Hold the first knot at a state, also where that is outside a range; forces and throttles are found.
+
+    Velocities that are in the middles of intervals are free: `AT_START` says what their rows are.
+
+    Args:
+        bounds: of every variable at every knot; those of the first one are changed.
+        robot: with the jets that the scenario uses.
+        scenario: with the ground.
+        initial: the state.
+        rule: name of the integration rule.
+    """
+    at = _kinematics(robot, initial)
+    points = at.points
+    held: dict[str, Array] = {
+        "com_position": at.com,
+        "com_velocity": at.momentum[:3],
+        "angular_momentum": at.momentum[3:],
+        "base_position": initial.base_position,
+        "base_quaternion_xyzw": signed_like(initial.base_quaternion_xyzw, robot.upright.base_quaternion_xyzw),
+        "base_linear_velocity": initial.base_linear_velocity,
+        "base_angular_velocity": initial.base_angular_velocity,
+        "joint_positions": initial.joint_positions,
+        "joint_velocities": initial.joint_velocities,
+        "contact_positions": points,
+        "thrust": initial.thrust,
+        "thrust_rate": initial.thrust_rate,
+    }
+    for name, value in held.items():
+        between = bool(rules.instant(rule, name))
+        bounds.lower[name][:, 0] = -np.inf if between else value
+        bounds.upper[name][:, 0] = np.inf if between else value
+    places = points.reshape(-1, 3).T
+    heights = places[2] - heights_below(scenario.surface, places)
+    least = 0.5 * scenario.contact_bounds(robot)[0] / np.maximum(heights, _IN_THE_AIR)
+    above, left = np.repeat(heights > _IN_THE_AIR, 3), np.repeat(np.minimum(NO_FORCE, least), 3)
+    bounds.lower["contact_forces"][above, 0] = -left[above]
+    bounds.upper["contact_forces"][above, 0] = left[above]
+
+
+AT_START: Mapping[str, Callable[[Robot, State], Array]] = MappingProxyType(
+    {
+        "momentum_at_start": lambda robot, state: _kinematics(robot, state).momentum,
+        "base_twist_at_start": lambda robot, state: np.concatenate(
+            [state.base_linear_velocity, state.base_angular_velocity]
+        ),
+        "joint_velocities_at_start": lambda robot, state: state.joint_velocities,
+        "thrust_rate_at_start": lambda robot, state: state.thrust_rate,
+    }
+)
+"""What the rows of a term are equal to in the first interval, by its name: the velocities at the first knot.
+
+Under leapfrog a velocity is at mid-interval. (v_−½ + v_½) / 2 = v(0) and v_½ = v_−½ + a_0 Δt make
+v_½ = v(0) + ½ a_0 Δt, the half kick of Störmer and Verlet, with the acceleration of the
+new plan: of order two, as the rule itself.
+"""
