@@ -29,6 +29,11 @@ _IN_THE_AIR = 1e-3
 def check(robot: Robot, scenario: Scenario, initial: State | None) -> None:
     """Make sure that there is a state where the scenario starts in one, and nowhere else.
 
+    Args:
+        robot: with the jets that the scenario uses.
+        scenario: the task.
+        initial: the state, if there is one.
+
     Raises:
         ScenarioError: the start is a given one and there is no state.
         InputError: there is a state and the start is another one, or the state is of another robot.

@@ -70,7 +70,13 @@ def same_terms(scenario: Scenario, other: Scenario) -> bool:
 
 
 def started(robot: Robot, scenario: Scenario, initial: State | None) -> Scenario:
-    """Return a scenario with the CoM of the state that it starts in, if it starts in a given one."""
+    """Return a scenario with the CoM of the state that it starts in, if it starts in a given one.
+
+    Args:
+        robot: with the jets that the scenario uses.
+        scenario: the task.
+        initial: the state, if there is one.
+    """
     if initial is None:
         return scenario
     x, y, z = (float(value) for value in given.com(robot, initial))

@@ -45,7 +45,13 @@ def regrid(trajectory: Trajectory, knots: int, rule: str) -> Trajectory:
 
 
 def at_times(trajectory: Trajectory, name: str, times: Array) -> Array:
-    """Return a quantity at times [s]; before its first instant and after its last it is what it is there."""
+    """Return a quantity at times [s]; before its first instant and after its last it is what it is there.
+
+    Args:
+        trajectory: of any rule.
+        name: of the quantity.
+        times: wanted [s].
+    """
     values = getattr(trajectory, name)
     own = trajectory.times(name)
     wanted = np.clip(times, own[0], own[-1])
