@@ -12,7 +12,7 @@ import multimodal_to
 
 ROOT = Path(multimodal_to.__file__).parent
 FLOORS = [
-    {"errors"},
+    {"errors", "values"},
     {"files"},
     {"adam"},
     {"models"},

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any, Self
 
 import casadi as cs
@@ -14,6 +15,7 @@ from multimodal_to.adam.representation import Representations, checked_represent
 from multimodal_to.adam.tree import Tree
 from multimodal_to.adam.urdf import load_tree
 from multimodal_to.errors import InputError, ModelError
+from multimodal_to.values import content
 
 GRAVITY = (0.0, 0.0, -9.80665)
 """Standard acceleration of free fall in world axes [m/s²]."""
@@ -40,6 +42,32 @@ class Library:
         self._representation = checked_representation(representation)
         self._f_opts = dict(f_opts or {})
         self._functions: dict[tuple[object, ...], cs.Function] = {}
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether the other is a library of the same robot, gravity, representation and `f_opts`."""
+        return type(self) is type(other) and self._content() == other._content()
+
+    def __hash__(self) -> int:
+        return hash(self.tree)  # which does not change, as gravity may
+
+    def _content(self) -> tuple[Hashable, ...]:
+        return content(self.tree), content(self._gravity), self._representation, content(self._f_opts)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_functions": {}}  # they are made anew where they are asked for
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._gravity = _checked_gravity(self._gravity)
+
+    def __copy__(self) -> Self:
+        return copy.deepcopy(self)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return a library that may change on its own; the tree and the functions, which cannot, are shared."""
+        other = memo[id(self)] = object.__new__(type(self))
+        other.__dict__.update(self.__dict__, _f_opts=dict(self._f_opts), _functions=dict(self._functions))
+        return other
 
     @classmethod
     def from_urdf(

@@ -21,7 +21,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
-from types import MappingProxyType
 from typing import Any, Protocol, TypeVar, cast
 
 import casadi as cs
@@ -29,6 +28,7 @@ import numpy as np
 
 from multimodal_to.adam.library import Library
 from multimodal_to.errors import InputError
+from multimodal_to.values import FrozenMapping
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Argument:
     meaning: str
 
 
-ARGUMENTS: Mapping[str, Argument] = MappingProxyType(
+ARGUMENTS: Mapping[str, Argument] = FrozenMapping(
     {
         "base_transform": Argument("H", (4, 4), "w_H_base, world-from-base, (4, 4) [1, m]."),
         "joint_positions": Argument("s", (None, 1), "s, (n, 1) [rad or m], in the order of `joint_names`."),

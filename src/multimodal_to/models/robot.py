@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 
 import casadi as cs
 import numpy as np
@@ -26,6 +25,7 @@ from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import Jet
 from multimodal_to.models.proportions import Gait
 from multimodal_to.models.robot_keys import JetTable, JointTable, RobotFile
+from multimodal_to.values import FrozenMapping, Value
 
 ROBOT_FILE = "robot.toml"
 _RECORDS = Records(what="the robot", error=ModelError)
@@ -34,7 +34,7 @@ NamePairs = frozenset[frozenset[str]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Posture:
+class Posture(Value):
     """A configuration of the robot: base in the world and joints."""
 
     base_position: Array  # (3,) [m]
@@ -51,7 +51,7 @@ class Posture:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class JointLimits:
+class JointLimits(Value):
     """Ranges to plan in, each (n,) in the order of the joints."""
 
     lower: Array  # [rad or m]
@@ -61,7 +61,7 @@ class JointLimits:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Robot:
+class Robot(Value):
     """Everything that depends on the robot and not on the task."""
 
     name: str
@@ -247,7 +247,7 @@ def _robot(file: RobotFile, folder: Path) -> Robot:
         name=file.name,
         urdf=urdf,
         kindyn=kindyn,
-        joint_groups=MappingProxyType(dict(file.joint_groups)),
+        joint_groups=FrozenMapping(file.joint_groups),
         joint_limits=_limits(file, kindyn),
         contacts=contacts,
         friction=file.contact.friction,

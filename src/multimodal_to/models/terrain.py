@@ -10,7 +10,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 from typing import Protocol
 
 import casadi as cs
@@ -19,6 +18,7 @@ import numpy as np
 from multimodal_to.adam.spatial import SX, Array
 from multimodal_to.errors import InputError
 from multimodal_to.models import bspline
+from multimodal_to.values import FrozenMapping
 
 Vector2 = tuple[float, float]
 
@@ -97,6 +97,15 @@ class CachedSurface:
         self._surface = surface
         self._known: dict[int, tuple[SX, tuple[SX, SX, SX]]] = {}  # with the point, so that its id stays its own
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, CachedSurface) and self._surface == other._surface
+
+    def __hash__(self) -> int:
+        return hash((CachedSurface, self._surface))
+
+    def __reduce__(self) -> tuple[type[CachedSurface], tuple[Surface]]:
+        return CachedSurface, (self._surface,)
+
     def _frame(self, point: SX) -> tuple[SX, SX, SX]:
         if id(point) not in self._known:
             self._known[id(point)] = point, frame(self._surface, point)
@@ -134,6 +143,7 @@ class Plane(Relief):
         _finite("slope", self.slope)
         _finite("height", self.height)
         _unit(self.direction)
+        _as_tuples(self, "direction")
 
     def height_and_slopes(self, x: SX, y: SX) -> tuple[SX, SX, SX]:
         """Return h [m] and the constant slopes [1]."""
@@ -163,6 +173,7 @@ class Stairs(Relief):
 
     def __post_init__(self) -> None:
         _unit(self.direction)
+        _as_tuples(self, "direction", "edges", "heights")
         _finite("edges", *self.edges)
         _finite("heights", *self.heights)
         if not self.edges or len(self.heights) != len(self.edges) + 1:
@@ -224,6 +235,7 @@ class HeightField(Relief):
             raise InputError(f"the height field has {nodes} nodes; expected at most {MOST_NODES}")
         _finite("heights", *(number for row in self.heights for number in row))
         object.__setattr__(self, "heights", tuple(tuple(map(float, row)) for row in self.heights))
+        _as_tuples(self, "x_range", "y_range")
 
     @classmethod
     def sampled(
@@ -262,7 +274,7 @@ class HeightField(Relief):
 MOST_NODES = 40_000
 """The most nodes of a height field: with more, expressions take minutes to build."""
 
-SURFACES: Mapping[str, type[FlatGround | Plane | Stairs | HeightField]] = MappingProxyType(
+SURFACES: Mapping[str, type[FlatGround | Plane | Stairs | HeightField]] = FrozenMapping(
     {"flat": FlatGround, "plane": Plane, "stairs": Stairs, "height-field": HeightField}
 )
 """The surfaces that a scenario's file can name, by their kind."""
@@ -291,6 +303,12 @@ def heights_below(surface: Surface, points: Array) -> Array:
     distance = cs.SX(surface.distance(point))
     step = cs.Function("step", [point], [distance / cs.jacobian(distance, point)[2]])
     return np.asarray(points[2] - np.array(step.map(points.shape[1])(points)).ravel())
+
+
+def _as_tuples(surface: Plane | Stairs | HeightField, *names: str) -> None:
+    """Keep sequences of numbers as tuples of floats, which hash and equal whatever they were given as."""
+    for name in names:
+        object.__setattr__(surface, name, tuple(map(float, getattr(surface, name))))
 
 
 def _finite(label: str, *numbers: float) -> None:

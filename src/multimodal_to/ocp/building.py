@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import copyreg
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import casadi as cs
@@ -70,6 +71,14 @@ def build(robot: Robot, scenario: Scenario, formulation: Formulation | None = No
     )
     _refuse_no_numbers(problem, outline.stages)
     return problem
+
+
+def _built_again(problem: Problem) -> tuple[Callable[..., Problem], tuple[Robot, Scenario, Formulation]]:
+    """Return how pickle makes a problem: CasADi's expressions do not travel, and what they are built from does."""
+    return build, (problem.robot, problem.scenario, problem.formulation)
+
+
+copyreg.pickle(Problem, _built_again)
 
 
 def precompile(robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> tuple[Path, ...]:

@@ -30,6 +30,8 @@ class Formulation:
     interval_scale: float = INTERVAL_SCALE  # the size of Δt that the solver sees as one [s]
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "terms", tuple(self.terms))
+        object.__setattr__(self, "variables", tuple(self.variables))
         for term in self.terms:
             if not isinstance(term, Constraint | Cost):
                 raise FormulationError(f"{shown(term)} is no term; expected a Constraint or a Cost")

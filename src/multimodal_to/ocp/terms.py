@@ -249,6 +249,9 @@ def _complete(term: Constraint | Cost, function: Any, place: str) -> None:
     Raises:
         FormulationError: something is not what it should be.
     """
+    for key in ("unit", "labels", place):
+        if isinstance(value := getattr(term, key, None), list):
+            object.__setattr__(term, key, tuple(value))
     name = term.name or getattr(function, "__name__", "")
     if not callable(function):
         raise _wrong(term.name, f"what it asks for is {shown(function)}", "a function")

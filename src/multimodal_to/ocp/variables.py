@@ -14,6 +14,7 @@ from multimodal_to.errors import FormulationError, ScenarioError, unknown
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import QUANTITIES
+from multimodal_to.values import Value
 
 
 @dataclass(frozen=True)
@@ -58,8 +59,8 @@ INTERVAL_SCALE = 0.1
 """What the solver sees as one of Δt [s]."""
 
 
-@dataclass(frozen=True)
-class Layout:
+@dataclass(frozen=True, eq=False)
+class Layout(Value):
     """Where each decision variable stands among those of one knot."""
 
     rows: dict[str, slice]

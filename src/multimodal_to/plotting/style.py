@@ -20,6 +20,7 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory, rules
 from multimodal_to.trajectory.derived import flight_phases, without_acceleration
 from multimodal_to.trajectory.sameness import refuse_other_robot
+from multimodal_to.values import Value
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """What a figure can be saved as."""
@@ -35,7 +36,7 @@ _DPI = 150
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Run:
+class Run(Value):
     """One trajectory in a figure: with the robot that has its jets, and the line style and name that tell it apart."""
 
     robot: Robot

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from enum import Enum
-from types import MappingProxyType
 
 from multimodal_to.errors import ScenarioError, shown
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Surface
+from multimodal_to.values import FrozenMapping
 
 Vector3 = tuple[float, float, float]
 
@@ -106,7 +106,7 @@ class Weights:
             for number in value.values() if isinstance(value, Mapping) else (value,):
                 if not (math.isfinite(number) and number >= 0):
                     raise ScenarioError(f"weight '{entry.name}' is {number}; expected a number of at least zero")
-        object.__setattr__(self, "joint_velocities", MappingProxyType(dict(self.joint_velocities)))
+        object.__setattr__(self, "joint_velocities", FrozenMapping(self.joint_velocities))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,7 +193,7 @@ class Scenario:
     """How many steps the feet take in the start guess, in turns [1]; with 0 they glide along with the CoM."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "allowances", MappingProxyType(dict(self.allowances)))
+        object.__setattr__(self, "allowances", FrozenMapping(self.allowances))
         self._check_name()
         self._check_numbers()
         self._check_positions()
@@ -236,6 +236,7 @@ class Scenario:
             value = getattr(self, label)
             if len(value) != 3 or not all(math.isfinite(number) for number in value):
                 raise ScenarioError(f"{label} is {value}; expected three finite numbers [m]")
+            object.__setattr__(self, label, tuple(map(float, value)))
         for label in ("initial_com", "final_com"):
             for axis, number, bound in zip("xyz", getattr(self, label), self.com_range, strict=True):
                 if abs(number) > bound:

@@ -20,6 +20,7 @@ from multimodal_to.solving.motion import motion
 from multimodal_to.solving.status import Status
 from multimodal_to.solving.violations import Violation, unmet_terms
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.values import Value
 
 GIVES_WAY = 1e-4
 """What a row has to give way by to be named, in solver units: 0.1 mm, 5e-3 N."""
@@ -28,7 +29,7 @@ _NEARNESS = 1e-5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Relaxation:
+class Relaxation(Value):
     """What has to give way, as far as a local method can say."""
 
     status: Status  # of the relaxed problem

@@ -21,6 +21,7 @@ from multimodal_to.solving.solver import FEASIBLE, Ending, Solver, StartPoint
 from multimodal_to.solving.status import Status
 from multimodal_to.solving.violations import Violation, unmet
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.values import Value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +37,7 @@ class Iterate:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Solution:
+class Solution(Value):
     """What a solve ended with: its verdict by name, and the trajectory.
 
     Without an answer the trajectory is the best iterate: of those that are feasible within `FEASIBLE` the one with

@@ -17,6 +17,7 @@ from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing, text, texts
 from multimodal_to.trajectory.format import ENTRIES, FORMAT_VERSION, FORMATS
 from multimodal_to.trajectory.quantities import QUANTITIES, labels
+from multimodal_to.values import Value
 
 _NO_ROTATION = 1e-6
 """A quaternion all of whose parts are smaller cannot be made a unit one."""
@@ -26,7 +27,7 @@ _LABELS = ("joint_names", "contact_names", "jet_names")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Trajectory:
+class Trajectory(Value):
     """Every quantity of the optimal control problem at every knot.
 
     Column k is of knot k or of the interval that ends there, as `rule` says: `trajectory.rules` has the instants. Rates
@@ -69,6 +70,7 @@ class Trajectory:
     solve_json: str = ""  # how it was solved, as `solving.record` writes it; empty where no solver made it
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.time.ndim != 1 or self.time.size < 2:
             raise TrajectoryError(f"'time' has shape {self.time.shape}; expected (knots + 1,) with at least two knots")
         if not (np.isfinite(self.time).all() and (np.diff(self.time) > 0).all()):
