@@ -12,7 +12,7 @@ import multimodal_to
 
 ROOT = Path(multimodal_to.__file__).parent
 FLOORS = [
-    {"errors", "values"},
+    {"children", "ending", "errors", "values"},
     {"files"},
     {"adam"},
     {"models"},

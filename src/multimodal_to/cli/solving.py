@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from dataclasses import asdict
@@ -30,6 +29,7 @@ from multimodal_to.cli.common import (
 )
 from multimodal_to.cli.expectation import expect
 from multimodal_to.cli.progress import Progress
+from multimodal_to.cli.streams import print_json, print_toml
 from multimodal_to.cli.tasks import free_checkpoint, given
 from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
@@ -106,7 +106,7 @@ def show(
         raise ScenarioError(f"'{name}' keeps no scenario")
     if trajectory is not None and (unusual := trajectory.unusual_formulation()):
         out.print(f"# the problem had {unusual}; a scenario does not hold these", soft_wrap=True)
-    out.print(to_toml(change(scenario, settings or ())), soft_wrap=True, end="")
+    print_toml(to_toml(change(scenario, settings or ())))
 
 
 def _show_torques(file: Path, robot: str) -> None:
@@ -145,7 +145,7 @@ def doctor(
     if as_json:
         findings = [asdict(finding) | {"severity": finding.severity.value} for finding in diagnosis.findings]
         data = {"task": name, "robot": the_robot.name, "hopeless": diagnosis.hopeless, "findings": findings}
-        typer.echo(json.dumps(data, indent=2, ensure_ascii=False))
+        print_json(data)
     else:
         for finding in diagnosis.findings:
             out.print(f"{finding.severity.value}: {finding}", soft_wrap=True)

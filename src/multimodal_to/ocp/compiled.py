@@ -15,13 +15,13 @@ from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import casadi as cs
 import numpy as np
 import platformdirs
 
 from multimodal_to.errors import OutputError, SolverError
+from multimodal_to.files.writing import scratch
 
 CACHE_VARIABLE = "MULTIMODAL_TO_CACHE"
 """Environment variable that names another folder than the user's cache."""
@@ -89,13 +89,17 @@ def _compile(function: cs.Function) -> Path:
     if path.is_file():
         return path
     command, _ = _compiler() or ("", "")
-    with TemporaryDirectory(dir=folder()) as scratch:
-        source, made = Path(scratch, "function.c"), Path(scratch, "function.so")
+    with scratch(folder()) as place:
+        source, made = place / "function.c", place / "function.so"
         generator = cs.CodeGenerator(source.name)
         generator.add(function)
-        generator.generate(f"{scratch}{os.sep}")
+        generator.generate(f"{place}{os.sep}")
         ended = subprocess.run(
-            [command, *_FLAGS, str(source), "-o", str(made), "-lm"], capture_output=True, text=True, check=False
+            [command, *_FLAGS, str(source), "-o", str(made), "-lm"],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            check=False,
         )
         if ended.returncode or not made.is_file():
             said = (ended.stderr.strip() or "it says nothing").splitlines()[0]
@@ -121,7 +125,7 @@ def _compiler() -> tuple[str, str] | None:
         found = shutil.which(name)
         if found is None:
             continue
-        ended = subprocess.run([found, "--version"], capture_output=True, text=True, check=False)
+        ended = subprocess.run([found, "--version"], capture_output=True, text=True, errors="replace", check=False)
         if ended.returncode == 0:
             return found, ended.stdout.split("\n", 1)[0]
     return None
