@@ -13,6 +13,7 @@ import multimodal_to
 ROOT = Path(multimodal_to.__file__).parent
 FLOORS = [
     {"children", "ending", "errors", "values"},
+    {"arguments"},
     {"files"},
     {"adam"},
     {"models"},

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from multimodal_to.adam.representation import Representations, checked_representation
 from multimodal_to.adam.tree import Tree
 from multimodal_to.adam.urdf import load_tree
-from multimodal_to.errors import InputError, ModelError
+from multimodal_to.arguments import checked
+from multimodal_to.errors import InputError, ModelError, shown
 from multimodal_to.values import content
 
 GRAVITY = (0.0, 0.0, -9.80665)
@@ -24,6 +25,7 @@ GRAVITY = (0.0, 0.0, -9.80665)
 class Library:
     """What the quantities of a robot need; `KinDynComputations` adds the quantities, and describes the arguments."""
 
+    @checked
     def __init__(
         self,
         urdfstring: str | os.PathLike[str],
@@ -154,10 +156,13 @@ class Library:
 
 
 def _checked_gravity(gravity: ArrayLike) -> np.ndarray:
-    vector = np.array(gravity, dtype=float).ravel()
+    try:
+        vector = np.array(gravity, dtype=float).ravel()
+    except Exception as error:  # NumPy and CasADi have no type in common for this
+        raise InputError(f"gravity is {shown(gravity)}; expected three finite numbers, as {GRAVITY}") from error
     if vector.shape == (6,) and not vector[3:].any():  # adam's form
         vector = vector[:3]
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"gravity is {gravity!r}; expected three finite numbers, for example {GRAVITY}")
+        raise InputError(f"gravity is {shown(gravity)}; expected three finite numbers, for example {GRAVITY}")
     vector.flags.writeable = False
     return vector

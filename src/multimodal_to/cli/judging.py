@@ -122,9 +122,10 @@ def simulate(
         out.print(
             f"inverse dynamics {where}: MuJoCo and RNEA differ by {difference:.1e} of the largest force", soft_wrap=True
         )
+    joints = f"joints {outcome.joint:.1f}° ({outcome.joint_name}), " if outcome.joint_name else ""
     out.print(
         f"largest errors over {plan.duration:.2f} s: CoM {100 * outcome.com:.1f} cm, base {outcome.attitude:.1f}°, "
-        f"joints {outcome.joint:.1f}° ({outcome.joint_name}), thrust {outcome.thrust:.1f} N",
+        f"{joints}thrust {outcome.thrust:.1f} N",
         soft_wrap=True,
     )
     beyond = "clipped" if outcome.clipped else "not clipped, beyond it"

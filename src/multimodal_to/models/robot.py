@@ -16,6 +16,7 @@ import numpy as np
 from multimodal_to.adam import KinDynComputations, quaternion
 from multimodal_to.adam.inspection import is_placeholder
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
 from multimodal_to.files.reading import read_toml
 from multimodal_to.files.records import Records
@@ -177,6 +178,7 @@ class Robot(Value):
                 )
         return tuple(pair for names, pair in by_names.items() if names in self.held_pairs)
 
+    @checked
     def with_jets(self, names: Sequence[str]) -> Robot:
         """Return the robot with only the jets of these names, in this order; with none it has none to use.
 
@@ -189,6 +191,7 @@ class Robot(Value):
                 raise ModelError(unknown("jet", name, known))
         return replace(self, jets=tuple(known[name] for name in names))
 
+    @checked
     def group_indices(self, group: str) -> list[int]:
         """Return where the joints of a named group stand in s.
 
@@ -208,6 +211,7 @@ def bundled_robots() -> dict[str, Path]:
     return {path.parent.name: path.parent for path in sorted(folder.glob(f"*/{ROBOT_FILE}"))}
 
 
+@checked
 def load_robot(robot: str | os.PathLike[str]) -> Robot:
     """Load a bundled robot by name, or any other from its folder.
 

@@ -16,6 +16,7 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import SX, Array
+from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import InputError
 from multimodal_to.models import bspline
 from multimodal_to.values import FrozenMapping
@@ -45,6 +46,10 @@ class FlatGround:
 
     height: float = 0.0
     """z of the ground [m]."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        _finite("height", self.height)
 
     def distance(self, point: SX) -> SX:
         """Return the height of a point above the plane [m]."""
@@ -140,6 +145,7 @@ class Plane(Relief):
     """z of the plane at the world's origin [m]."""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         _finite("slope", self.slope)
         _finite("height", self.height)
         _unit(self.direction)
@@ -172,6 +178,7 @@ class Stairs(Relief):
     """Width of the ramp that smooths a riser [m]."""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         _unit(self.direction)
         _as_tuples(self, "direction", "edges", "heights")
         _finite("edges", *self.edges)
@@ -221,7 +228,11 @@ class HeightField(Relief):
     """z of the nodes, one list for each x and one number in it for each y [m]."""
 
     def __post_init__(self) -> None:
-        for label, (low, high) in (("x_range", self.x_range), ("y_range", self.y_range)):
+        check_fields(self)
+        for label, ends in (("x_range", self.x_range), ("y_range", self.y_range)):
+            if len(ends) != 2:
+                raise InputError(f"{label} of the height field has {len(ends)} numbers; expected two")
+            low, high = ends
             if not -math.inf < low < high < math.inf:
                 raise InputError(f"{label} of the height field is {low} to {high} m; expected finite numbers that rise")
         lengths = {len(row) for row in self.heights}
@@ -238,6 +249,7 @@ class HeightField(Relief):
         _as_tuples(self, "x_range", "y_range")
 
     @classmethod
+    @checked
     def sampled(
         cls, height: Callable[[float, float], float], *, x_range: Vector2, y_range: Vector2, spacing: float
     ) -> HeightField:
@@ -255,7 +267,7 @@ class HeightField(Relief):
             np.linspace(low, high, max(bspline.LEAST_NODES, math.ceil((high - low) / spacing - 1e-9) + 1)).tolist()
             for low, high in (x_range, y_range)
         )
-        heights = tuple(tuple(float(height(at_x, at_y)) for at_y in y) for at_x in x)
+        heights = tuple(tuple(height(at_x, at_y) for at_y in y) for at_x in x)
         return cls(x_range=x_range, y_range=y_range, heights=heights)
 
     @cached_property
@@ -299,6 +311,8 @@ def heights_below(surface: Surface, points: Array) -> Array:
 
     One step of Newton's method from each point, which is exact for a surface whose d is linear in z, as all here are.
     """
+    if not points.shape[1]:  # which CasADi does not map over
+        return np.zeros(0)
     point = cs.SX.sym("p", 3)
     distance = cs.SX(surface.distance(point))
     step = cs.Function("step", [point], [distance / cs.jacobian(distance, point)[2]])

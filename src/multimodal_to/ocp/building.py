@@ -10,6 +10,7 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import FormulationError, listed
 from multimodal_to.models.robot import Robot
 from multimodal_to.ocp import compiled
@@ -23,6 +24,7 @@ from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.scenario import Scenario
 
 
+@checked
 def build(robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> Problem:
     """Return the problem of a scenario for a robot; nothing is solved but the start posture.
 
@@ -81,6 +83,7 @@ def _built_again(problem: Problem) -> tuple[Callable[..., Problem], tuple[Robot,
 copyreg.pickle(Problem, _built_again)
 
 
+@checked
 def precompile(robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> tuple[Path, ...]:
     """Compile the derivatives of a scenario's problem, for every later `build` of one like it; return their files.
 

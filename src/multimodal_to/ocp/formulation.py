@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import FormulationError, listed, shown, unknown
 from multimodal_to.ocp import margins, paper
 from multimodal_to.ocp.integration import BACKWARD_EULER, LEAPFROG, IntegrationRule
@@ -30,6 +31,7 @@ class Formulation:
     interval_scale: float = INTERVAL_SCALE  # the size of Δt that the solver sees as one [s]
 
     def __post_init__(self) -> None:
+        check_fields(self, FormulationError)
         object.__setattr__(self, "terms", tuple(self.terms))
         object.__setattr__(self, "variables", tuple(self.variables))
         for term in self.terms:
@@ -88,6 +90,7 @@ class Formulation:
     def _usual(self) -> Formulation:
         return Formulation.executable() if self.rule == LEAPFROG else Formulation.paper()
 
+    @checked
     def with_terms(self, *terms: Term) -> Formulation:
         """Return the formulation with more terms.
 
@@ -96,6 +99,7 @@ class Formulation:
         """
         return replace(self, terms=(*self.terms, *terms))
 
+    @checked
     def without(self, *names: str) -> Formulation:
         """Return the formulation without the terms of these names.
 
@@ -108,6 +112,7 @@ class Formulation:
                 raise FormulationError(unknown("term", name, known))
         return replace(self, terms=tuple(term for term in self.terms if term.name not in names))
 
+    @checked
     def with_scales(self, scales: Mapping[str, float]) -> Formulation:
         """Return the formulation with other sizes of variables that the solver sees as one, by name [own unit].
 
@@ -122,6 +127,7 @@ class Formulation:
         return replace(self, variables=tuple(changed))
 
     @classmethod
+    @checked
     def of_rule(cls, name: str) -> Formulation:
         """Return the formulation that integrates by the rule of a name, as a trajectory's file says it.
 

@@ -17,6 +17,7 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import SX, Array
+from multimodal_to.arguments import check_fields
 from multimodal_to.errors import FormulationError, MultimodalError, listed, shown
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
@@ -53,6 +54,9 @@ class Within:
 
     lower: Limit
     upper: Limit
+
+    def __post_init__(self) -> None:
+        check_fields(self, FormulationError, "the set's ")
 
     def limits(self, parameters: Parameters) -> tuple[float, float]:
         """Return the two numbers."""
@@ -249,6 +253,7 @@ def _complete(term: Constraint | Cost, function: Any, place: str) -> None:
     Raises:
         FormulationError: something is not what it should be.
     """
+    check_fields(term, FormulationError, f"the term {shown(term.name)}: ")
     for key in ("unit", "labels", place):
         if isinstance(value := getattr(term, key, None), list):
             object.__setattr__(term, key, tuple(value))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import check_fields
 from multimodal_to.errors import FormulationError, ScenarioError, unknown
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Scenario
@@ -29,6 +30,7 @@ class Variable:
     scale: float = 1.0  # [unit of the quantity]
 
     def __post_init__(self) -> None:
+        check_fields(self, FormulationError)
         if self.name not in QUANTITIES:
             raise FormulationError(unknown("variable", self.name, QUANTITIES))
         if not 0 < self.scale < math.inf:

@@ -1,5 +1,9 @@
 """Figures of one or several `Trajectory`s, which the caller shows or saves: nothing is shown here."""
 
+# isort: off
+from multimodal_to.plotting import backend  # noqa: F401  # before all that imports matplotlib
+
+# isort: on
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from enum import Enum
 
+from multimodal_to.arguments import check_fields
 from multimodal_to.errors import ScenarioError, shown
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
@@ -101,6 +102,7 @@ class Weights:
     """Weight of ḣω at the last knot [1/(N m)²]."""
 
     def __post_init__(self) -> None:
+        check_fields(self, ScenarioError, "weight ")
         for entry in fields(self):
             value = getattr(self, entry.name)
             for number in value.values() if isinstance(value, Mapping) else (value,):
@@ -128,6 +130,7 @@ class Margins:
     """Least distance between links of the robot that are not neighbours [L]."""
 
     def __post_init__(self) -> None:
+        check_fields(self, ScenarioError, "margin ")
         for entry in fields(self):
             number = getattr(self, entry.name)
             if not (math.isfinite(number) and number >= 0):
@@ -193,6 +196,7 @@ class Scenario:
     """How many steps the feet take in the start guess, in turns [1]; with 0 they glide along with the CoM."""
 
     def __post_init__(self) -> None:
+        check_fields(self, ScenarioError)
         object.__setattr__(self, "allowances", FrozenMapping(self.allowances))
         self._check_name()
         self._check_numbers()
@@ -228,6 +232,8 @@ class Scenario:
             value = getattr(self, label)
             if value is not None and not 0 < value < math.inf:
                 raise ScenarioError(f"{label} is {value}; expected a positive number")
+        if self.mid_height_min is not None and not math.isfinite(self.mid_height_min):
+            raise ScenarioError(f"mid_height_min is {self.mid_height_min}; expected a finite number [m]")
         if not 0 <= self.guess_steps <= self.knots:
             raise ScenarioError(f"guess_steps is {shown(self.guess_steps)}; expected 0 to the number of knots")
 

@@ -77,13 +77,13 @@ def tracking(playback: Playback) -> Tracking:
             for wanted, turn in zip(reference.rotation, _rotations(playback.qpos), strict=True)
         ]
     )
-    joints = np.degrees(np.abs(playback.qpos[:, 7:] - reference.joints))[during].max(axis=0)
+    joints = np.degrees(np.abs(playback.qpos[:, 7:] - reference.joints))[during].max(axis=0, initial=0.0)
     thrust = np.abs(playback.thrust - reference.thrust)[during]
     return Tracking(
         com=float(com[during].max()),
         attitude=float(attitude[during].max()),
-        joint=float(joints.max()),
-        joint_name=robot.joint_names[int(joints.argmax())],
+        joint=float(joints.max(initial=0.0)),
+        joint_name=robot.joint_names[int(joints.argmax())] if joints.size else "",
         thrust=float(thrust.max(initial=0.0)),
         switches=_switches(playback),
         torques=_joint_torques(playback),

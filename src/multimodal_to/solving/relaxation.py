@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.ocp.problem import Problem
 from multimodal_to.solving import machine
@@ -39,6 +40,7 @@ class Relaxation(Value):
     solve_time: float  # [s]
 
 
+@checked
 def relax(
     problem: Problem, start: Trajectory | None = None, solver: Ipopt | None = None, *, terms: Sequence[str] = ()
 ) -> Relaxation:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import SolverError
 from multimodal_to.ocp.problem import Problem
 from multimodal_to.solving import machine
@@ -69,6 +70,7 @@ Progress = Callable[[Iterate], bool]
 """Called at every iteration; a true answer stops the solve."""
 
 
+@checked
 def solve(
     problem: Problem,
     solver: Solver | None = None,

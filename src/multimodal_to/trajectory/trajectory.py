@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import LONGEST, InputError, TrajectoryError, listed, shortened, unknown
 from multimodal_to.files.writing import whole
 from multimodal_to.trajectory import rules
@@ -71,6 +72,7 @@ class Trajectory(Value):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        check_fields(self, TrajectoryError)
         if self.time.ndim != 1 or self.time.size < 2:
             raise TrajectoryError(f"'time' has shape {self.time.shape}; expected (knots + 1,) with at least two knots")
         if not (np.isfinite(self.time).all() and (np.diff(self.time) > 0).all()):
@@ -137,6 +139,7 @@ class Trajectory(Value):
             parts.append(f"integration by {self.rule}")
         return shortened("; ".join(parts), LONGEST)
 
+    @checked
     def labels(self, name: str) -> tuple[str, ...]:
         """Return what the rows of a quantity are called, such as `l_knee` or `l_sole_1 z`.
 
@@ -145,6 +148,7 @@ class Trajectory(Value):
         """
         return labels(name, self)
 
+    @checked
     def times(self, name: str) -> Array:
         """Return at which times the columns of a quantity are [s], (knots + 1,), as the rule has it.
 
@@ -157,6 +161,7 @@ class Trajectory(Value):
             raise InputError(unknown("quantity", name, QUANTITIES))
         return rules.instants(self.time, self.rule, name)
 
+    @checked
     def per_contact(self, name: str) -> Array:
         """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1).
 
@@ -173,6 +178,7 @@ class Trajectory(Value):
         """Return the sum of the world-vertical contact forces [N], (knots + 1,)."""
         return np.asarray(self.per_contact("contact_forces")[:, 2].sum(axis=0))
 
+    @checked
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the trajectory as a compressed `.npz` without pickle; the file appears whole or not at all.
 
@@ -197,6 +203,7 @@ class Trajectory(Value):
         return Path(path)
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str]) -> Trajectory:
         """Read a trajectory that `save` wrote, of this format version or an older one.
 
