@@ -15,6 +15,7 @@ import pytest
 
 import multimodal_to as mt
 from drones import drone
+from multimodal_to.errors import apart
 from multimodal_to.ocp.integration import LEAPFROG
 from multimodal_to.trajectory.rules import VELOCITIES
 from multimodal_to.values import FrozenMapping
@@ -175,3 +176,10 @@ def test_a_frozen_mapping_is_a_mapping_and_nothing_more():
         mapping["c"] = 3
     with pytest.raises(AttributeError):
         mapping.more = 3
+
+
+def test_numbers_that_are_compared_are_told_apart():
+    assert apart(0.1, 0.1003) == "0.1"
+    assert apart(0.10030412, 0.1) == "0.1003"
+    assert apart(1.0000001e-5, 1e-5) == "1.0000001e-05"
+    assert apart(2.0, 2.0) == "2"

@@ -33,7 +33,7 @@ from multimodal_to.cli.streams import print_json, print_toml
 from multimodal_to.cli.tasks import free_checkpoint, given
 from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
-from multimodal_to.errors import InputError, ScenarioError
+from multimodal_to.errors import InputError, ScenarioError, apart
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.ocp import Formulation, build
 from multimodal_to.ocp import precompile as compile_problem
@@ -43,7 +43,7 @@ from multimodal_to.scenarios import paper as as_in_paper
 from multimodal_to.scenarios.data import stored, to_dict
 from multimodal_to.scenarios.files import change, to_toml
 from multimodal_to.scenarios.scenario import Scenario
-from multimodal_to.solving import Ipopt, Relaxation, Solution, relax
+from multimodal_to.solving import Ipopt, Relaxation, Solution, Status, relax
 from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
 from multimodal_to.trajectory import Trajectory
@@ -216,7 +216,8 @@ def solve(
     chosen_solver = choose(linear_solver)  # before anything takes time
     console = Console(highlight=False, markup=False, emoji=False, quiet=quiet)
     the_robot = load_robot(task.robot)
-    _refuse_hopeless(examine(the_robot, scenario, task.formulation), console, force)
+    diagnosis = examine(the_robot, scenario, task.formulation)
+    _refuse_hopeless(diagnosis, console, force)
     folder = writable(output or (Path("results") / scenario.name if resume is None else resume.parent))
     started = time.perf_counter()
     problem = build(the_robot, scenario, task.formulation)
@@ -240,6 +241,9 @@ def solve(
         kept.unlink(missing_ok=True)
     report = audit(the_robot, solution.trajectory, scenario)
     _summarise(console, solution, report)
+    if solution.status in (Status.INFEASIBLE, Status.FAILED):
+        for finding in diagnosis.of(Severity.ERROR) + diagnosis.of(Severity.WARNING):
+            console.print(f"the doctor said: {finding}", soft_wrap=True)
     if explain and not solution.status.solved and not progress.interrupted:
         _explain(console, relax(problem, solution.trajectory, solver))
     if not (no_pictures or progress.interrupted):  # who stops a solve does not want to wait for pictures
@@ -304,8 +308,8 @@ def _summarise(console: Console, solution: Solution, report: Audit) -> None:
     failed = [finding for finding in report.findings if not finding.holds]
     for finding in failed:
         console.print(
-            f"audit: {finding.name} is {finding.worst:.2e} {finding.unit} at knot {finding.knot} {finding.body}, "
-            f"more than {finding.limit:g}",
+            f"audit: {finding.name} is {apart(finding.worst, finding.limit)} {finding.unit} at knot {finding.knot} "
+            f"{finding.body}, more than {finding.limit:g}",
             soft_wrap=True,
         )
     if not failed:

@@ -306,6 +306,20 @@ def frame_function(surface: Surface) -> cs.Function:
     return cs.Function("surface", [point], parts, ["p"], ["d", "n", "t"])
 
 
+def uphill(surface: Surface) -> Vector2 | None:
+    """Return the horizontal unit direction that alone changes the ground's height, upwards; None where there is none.
+
+    Across it the ground is the same everywhere.
+    """
+    if isinstance(surface, Plane):
+        unit_x, unit_y = _unit(surface.direction)
+        return (unit_x, unit_y) if surface.slope >= 0.0 else (-unit_x, -unit_y)
+    if isinstance(surface, Stairs):
+        unit_x, unit_y = _unit(surface.direction)
+        return (unit_x, unit_y) if surface.heights[-1] >= surface.heights[0] else (-unit_x, -unit_y)
+    return None
+
+
 def heights_below(surface: Surface, points: Array) -> Array:
     """Return the surface's z [m] below or above points (3, count): where d = 0, along the vertical.
 

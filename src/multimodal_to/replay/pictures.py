@@ -14,7 +14,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError, OutputError
 from multimodal_to.files.writing import scratch, whole
 from multimodal_to.models.robot import Robot
-from multimodal_to.models.terrain import FlatGround
+from multimodal_to.models.terrain import FlatGround, uphill
 from multimodal_to.replay.browser import open_browser
 from multimodal_to.replay.motion import surface_of
 from multimodal_to.replay.page import write_html, write_still_html
@@ -161,7 +161,8 @@ def write_snapshots(
 def snapshot_times(robot: Robot, trajectory: Trajectory) -> Array:
     """Return times [s] that tell a motion: start and end, and those where flight begins or ends, or even ones.
 
-    They are five; on ground that is not flat, where ghosts stand where they were, only those that leave room between.
+    They are five; on ground that changes every way, where ghosts stand where they were, only those that leave room
+    between.
 
     Args:
         robot: whose weight tells flight.
@@ -172,7 +173,8 @@ def snapshot_times(robot: Robot, trajectory: Trajectory) -> Array:
     times = np.linspace(start, end, 5)
     if len(edges) == 1:
         times = np.array([start, (start + edges[0]) / 2, edges[0], (edges[0] + end) / 2, end])
-    return times if isinstance(surface_of(trajectory), FlatGround) else _apart(trajectory, times)
+    surface = surface_of(trajectory)
+    return times if isinstance(surface, FlatGround) or uphill(surface) is not None else _apart(trajectory, times)
 
 
 def _apart(trajectory: Trajectory, times: Array) -> Array:
