@@ -48,16 +48,19 @@ def checked(function: Function) -> Function:
     return cast(Function, checking)
 
 
-def check_fields(value: Any, error: type[MultimodalError] = InputError, what: str = "") -> None:
+def check_fields(
+    value: Any, error: type[MultimodalError] = InputError, what: str = "", but: tuple[str, ...] = ()
+) -> None:
     """Check the fields of a dataclass against their annotations.
 
     Args:
         value: of the dataclass.
         error: what is raised.
         what: the fields are called, with a blank behind; by default only their names stand there.
+        but: fields that the dataclass checks itself, in words of its own.
     """
     hints = _hints(cast(Hashable, type(value)))
-    for entry in fields(value):
+    for entry in (entry for entry in fields(value) if entry.name not in but):
         check(f"{what}{entry.name}", getattr(value, entry.name), hints.get(entry.name, Any), error)
 
 
@@ -98,7 +101,13 @@ def _fits(value: object, annotation: Any) -> bool:
     kind = origin or annotation
     if kind is Any or not isinstance(kind, type):
         return True
-    if getattr(kind, "_is_protocol", False) and kind.__module__.startswith("multimodal_to"):
+    return _fits_class(value, kind, inner)
+
+
+def _fits_class(value: object, kind: type, inner: tuple[Any, ...]) -> bool:
+    if getattr(kind, "_is_protocol", False) and not issubclass(kind, Mapping | Sequence | Iterable | os.PathLike):
+        if not kind.__module__.startswith("multimodal_to"):  # as NumPy's, for all that it makes an array of
+            return True
         return all(getattr(value, name, None) is not None for name in _members(kind))
     if issubclass(kind, Mapping):
         of_key, of_value = inner if len(inner) == 2 else (Any, Any)

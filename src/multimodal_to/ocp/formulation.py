@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from multimodal_to.arguments import check_fields, checked
+from multimodal_to.arguments import check, check_fields, checked
 from multimodal_to.errors import FormulationError, listed, shown, unknown
 from multimodal_to.ocp import margins, paper
 from multimodal_to.ocp.integration import BACKWARD_EULER, LEAPFROG, IntegrationRule
@@ -31,7 +31,8 @@ class Formulation:
     interval_scale: float = INTERVAL_SCALE  # the size of Δt that the solver sees as one [s]
 
     def __post_init__(self) -> None:
-        check_fields(self, FormulationError)
+        check_fields(self, FormulationError, but=("terms",))
+        check("terms", self.terms, Sequence, FormulationError)
         object.__setattr__(self, "terms", tuple(self.terms))
         object.__setattr__(self, "variables", tuple(self.variables))
         for term in self.terms:

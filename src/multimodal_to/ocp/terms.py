@@ -253,7 +253,12 @@ def _complete(term: Constraint | Cost, function: Any, place: str) -> None:
     Raises:
         FormulationError: something is not what it should be.
     """
-    check_fields(term, FormulationError, f"the term {shown(term.name)}: ")
+    check_fields(
+        term,
+        FormulationError,
+        f"the term {shown(term.name)}: ",
+        ("value", "residual", "within", "holds", "charged", "name"),
+    )
     for key in ("unit", "labels", place):
         if isinstance(value := getattr(term, key, None), list):
             object.__setattr__(term, key, tuple(value))
