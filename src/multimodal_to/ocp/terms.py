@@ -257,7 +257,7 @@ def _complete(term: Constraint | Cost, function: Any, place: str) -> None:
         term,
         FormulationError,
         f"the term {shown(term.name)}: ",
-        ("value", "residual", "within", "holds", "charged", "name"),
+        ("value", "residual", "within", "holds", "charged"),
     )
     for key in ("unit", "labels", place):
         if isinstance(value := getattr(term, key, None), list):
