@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import copyreg
+from collections.abc import Callable, Sequence
 
 import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import FormulationError, listed
 from multimodal_to.models.robot import Robot
 from multimodal_to.ocp.formulation import Formulation
@@ -20,6 +22,7 @@ from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.scenario import Scenario
 
 
+@checked
 def build(robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> Problem:
     """Return the problem of a scenario for a robot; nothing is solved but the start posture.
 
@@ -69,6 +72,14 @@ def build(robot: Robot, scenario: Scenario, formulation: Formulation | None = No
     )
     _refuse_no_numbers(problem, outline.stages)
     return problem
+
+
+def _built_again(problem: Problem) -> tuple[Callable[..., Problem], tuple[Robot, Scenario, Formulation]]:
+    """Return how pickle makes a problem: CasADi's expressions do not travel, and what they are built from does."""
+    return build, (problem.robot, problem.scenario, problem.formulation)
+
+
+copyreg.pickle(Problem, _built_again)
 
 
 def _row_bounds(stages: Sequence[NamedStage]) -> tuple[Array, Array, dict[str, RowSet]]:
