@@ -29,6 +29,24 @@ class Ended:
 def run(*arguments: object, cwd: Path | None = None, columns: int = 200, **environment: str) -> Ended:
     """Run a command in this process, where every warning is an error; that spares the imports of a process."""
     out, err = io.StringIO(), io.StringIO()
+    code = _run(out, err, *arguments, cwd=cwd, columns=columns, **environment)
+    return Ended(returncode=code, stdout=out.getvalue(), stderr=err.getvalue())
+
+
+def run_into(encoding: str, *arguments: object, cwd: Path | None = None) -> Ended:
+    """Run a command in this process with streams of an encoding; what it printed is decoded from their bytes."""
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding=encoding, newline="") for _ in range(2))
+    code = _run(out, err, *arguments, cwd=cwd, columns=200)
+    texts = []
+    for stream in (out, err):
+        stream.flush()
+        texts.append(stream.buffer.getvalue().decode(encoding))
+    return Ended(returncode=code, stdout=texts[0], stderr=texts[1])
+
+
+def _run(
+    out: io.TextIOBase, err: io.TextIOBase, *arguments: object, cwd: Path | None, columns: int, **environment: str
+) -> int:
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
         patch.setattr(sys, "argv", ["multimodal-to", *map(str, arguments)])
         patch.setattr(sys.modules["__main__"], "__package__", None)  # else the usage names that of the tests' runner
@@ -40,7 +58,7 @@ def run(*arguments: object, cwd: Path | None = None, columns: int = 200, **envir
             patch.chdir(cwd)
         with pytest.raises(SystemExit) as ended:
             main()
-    return Ended(returncode=ended.value.code, stdout=out.getvalue(), stderr=err.getvalue())
+    return ended.value.code
 
 
 def run_process(*arguments: object, **environment: str) -> Ended:

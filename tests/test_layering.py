@@ -12,7 +12,8 @@ import multimodal_to
 
 ROOT = Path(multimodal_to.__file__).parent
 FLOORS = [
-    {"errors"},
+    {"children", "ending", "errors", "values"},
+    {"arguments"},
     {"files", "native"},
     {"adam"},
     {"models"},

@@ -5,6 +5,11 @@ A `Robot` and a `Scenario` go into `build`; `solve` returns a `Solution` with a 
 trajectory and the robot.
 """
 
+# It handles Ctrl-C where this is the command line: before anything that takes time.
+# isort: off
+from multimodal_to import ending  # noqa: F401
+
+# isort: on
 from multimodal_to import scenarios
 from multimodal_to.adam import KinDynComputations
 from multimodal_to.auditing import Audit, audit

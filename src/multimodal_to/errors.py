@@ -101,6 +101,19 @@ def shown(value: object) -> str:
         return "a number of thousands of digits"
 
 
+def apart(value: float, *others: float, digits: int = 3) -> str:
+    """Return a number with as many digits as tell it from others, at least so many.
+
+    >>> apart(0.1, 0.1003), apart(0.10030412, 0.1), apart(2.0, 3.0)
+    ('0.1', '0.1003', '2')
+    """
+    for count in range(digits, 17):
+        text = f"{value:.{count}g}"
+        if all(float(text) != float(f"{other:.{count}g}") for other in others if other != value):
+            return text
+    return repr(float(value))
+
+
 def shortened(text: str, length: int) -> str:
     """Return a text without its middle where it is longer than so many characters."""
     return text if len(text) <= length else f"{text[: length - length // 3]} … {text[-(length // 3) :]}"

@@ -112,7 +112,9 @@ def test_a_push_that_the_plan_does_not_follow_moves_the_com_as_newton_says(rule,
     """A force F for Δt leaves a speed F Δt / m, from the middle of the time in which it acts on."""
     robot, push = drone(tmp_path), 30.0
     plan = hovering(robot, rule)
-    plan.contact_forces[2::3, 5] = push / len(robot.contacts)
+    forces = plan.contact_forces.copy()
+    forces[2::3, 5] = push / len(robot.contacts)
+    plan = replace(plan, contact_forces=forces)
     entries = found(robot, plan)
     gain = push / robot.mass * STEP**2
     near, far = entries["CoM off integrator, stretch"], entries["CoM off integrator, horizon"]
@@ -128,8 +130,10 @@ def test_a_moment_that_the_plan_does_not_follow_turns_the_base_as_euler_says(rul
     robot, push, arm = drone(tmp_path, arm=0.2), 2.0, 0.2
     plan = hovering(robot, rule)
     feet = [frame_poses(robot, plan, name)[0, :3, 3] for name in robot.contact_names]
+    forces = plan.contact_forces.copy()
     for row, foot in enumerate(feet):
-        plan.contact_forces[3 * row + 1, 5] = push * np.sign(foot[0])
+        forces[3 * row + 1, 5] = push * np.sign(foot[0])
+    plan = replace(plan, contact_forces=forces)
     entry = found(robot, plan)["base off integrator, stretch"]
     gain = len(feet) * push * arm / 0.4 * STEP**2  # 0.4 kg m² is the drone's inertia about the vertical
     assert entry.worst == pytest.approx(gain * (stretch(robot) - lost), rel=1e-6)
@@ -184,8 +188,9 @@ def test_the_base_turns_so_that_the_momentum_of_the_posture_is_that_of_the_state
 def test_what_runs_away_is_far_off_without_a_warning(tmp_path):
     robot = drone(tmp_path)
     plan = hovering(robot)
-    plan.throttle[0, 3] = 1e9
-    entries = found(robot, plan)
+    throttle = plan.throttle.copy()
+    throttle[0, 3] = 1e9
+    entries = found(robot, replace(plan, throttle=throttle))
     assert entries["CoM off integrator, stretch"].worst > 1e6
 
 

@@ -192,6 +192,8 @@ def test_a_task_that_contradicts_itself_is_explained_by_what_has_to_give_way(tmp
     result = run("solve", "too_high.toml", *options, cwd=tmp_path)
     assert result.returncode == 1
     assert "explain: gives way: contact_reach at knot 10, " in result.stdout
+    assert "seldom the cause; `solve --explain`" in result.stdout
+    assert re.search(r"^the doctor said: .*reach", result.stdout, re.MULTILINE)
     missing = re.search(r"^explain: gives way: com_kinematics at knot 10, z, by (\S+) m", result.stdout, re.MULTILINE)
     assert float(missing[1]) == pytest.approx(0.70 - 0.60, abs=0.01)  # the legs reach 0.60 m
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 from dataclasses import replace
 
@@ -353,3 +354,15 @@ def test_a_hopeless_solve_is_refused_and_writes_nothing_unless_it_is_forced(tmp_
     assert "error: spool-up" in forced.stderr
     assert "iteration limit" in forced.stdout
     assert (tmp_path / "out" / "trajectory.npz").is_file()
+
+
+def test_the_height_that_stiff_legs_reach_is_told_from_the_one_asked_for_and_is_accepted(tmp_path):
+    robot = drone(tmp_path)
+    task = replace(scenarios.take_off(), initial_com=(0.0, 0.0, 0.4003), final_com=(0.0, 0.0, 0.7))
+    task = replace(task, weights=replace(task.weights, joint_velocities={}))
+    (symptom,) = [some for some in mt.doctor(robot, task).of(Severity.ERROR) if some.name == "standing start"]
+    height = float(re.search(r"reach is (\S+) m", symptom.change)[1])
+    assert height == pytest.approx(0.4, abs=1e-4)
+    assert height != 0.4003
+    again = mt.doctor(robot, replace(task, initial_com=(0.0, 0.0, height)))
+    assert "standing start" not in [some.name for some in again.findings]

@@ -19,6 +19,7 @@ from multimodal_to.models.terrain import (
     frame,
     frame_function,
     heights_below,
+    uphill,
 )
 
 RNG = np.random.default_rng(11)
@@ -201,3 +202,28 @@ def test_a_remembered_surface_says_the_same_and_asks_once():
 def test_surfaces_that_cannot_be_are_refused(make, sentence):
     with pytest.raises(InputError, match=sentence):
         make()
+
+
+@pytest.mark.parametrize(
+    ("surface", "way"),
+    [
+        (Plane(slope=0.3, direction=(1.0, 1.0)), (0.5**0.5, 0.5**0.5)),
+        (Plane(slope=-0.3, direction=(0.0, 2.0)), (0.0, -1.0)),
+        (Stairs(edges=(0.0, 0.5), heights=(0.0, 0.1, 0.2), direction=(-1.0, 0.0)), (-1.0, 0.0)),
+        (Stairs(edges=(0.0,), heights=(0.2, 0.0)), (-1.0, 0.0)),
+    ],
+)
+def test_the_ground_rises_uphill_and_stays_the_same_across(surface, way):
+    x, y = uphill(surface)
+    assert (x, y) == pytest.approx(way)
+    start = np.array([[-1.0 * x], [-1.0 * y], [0.0]])
+    above, across = np.array([[2.0 * x], [2.0 * y], [0.0]]), np.array([[-3.0 * y], [3.0 * x], [0.0]])
+    low, high, same = (heights_below(surface, start + moved)[0] for moved in (np.zeros((3, 1)), above, across))
+    assert high > low
+    assert same == pytest.approx(low)
+
+
+def test_a_height_field_has_no_way_that_alone_changes_its_height():
+    field = HeightField.sampled(lambda x, y: x * y, x_range=(0.0, 1.0), y_range=(0.0, 1.0), spacing=0.3)
+    assert uphill(field) is None
+    assert uphill(FlatGround()) is None

@@ -211,4 +211,4 @@ def test_other_times_are_read_between_the_instants_of_each_quantity(touch_down):
 def test_a_solve_starts_from_a_motion_of_the_other_rule(ironcub, touch_down):
     warm = mt.solve(mt.build(ironcub, TOUCH_DOWN, PAPER), start=touch_down[1].trajectory)
     assert warm.status is mt.Status.OPTIMAL
-    assert warm.iterations < 0.5 * touch_down[0].iterations
+    assert warm.iterations < 0.6 * touch_down[0].iterations

@@ -154,6 +154,7 @@ def test_a_term_holds_where_it_says(ironcub):
         mt.Where.EVERY_KNOT: later,
         mt.Where.LAST_KNOT: [6],
         mt.Where.EVERY_INTERVAL: later,
+        mt.Where.FIRST_INTERVAL: [1],
         mt.Where.LAST_INTERVAL: [6],
     }
     air = replace(mt.scenarios.landing(), knots=6)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import os
-from collections.abc import Callable, Mapping, Sequence
-from copy import copy
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any, Self
 
 import casadi as cs
@@ -14,7 +14,9 @@ from numpy.typing import ArrayLike
 from multimodal_to.adam.representation import Representations, checked_representation
 from multimodal_to.adam.tree import Tree
 from multimodal_to.adam.urdf import load_tree
-from multimodal_to.errors import InputError, ModelError
+from multimodal_to.arguments import checked
+from multimodal_to.errors import InputError, ModelError, shown
+from multimodal_to.values import content
 
 GRAVITY = (0.0, 0.0, -9.80665)
 """Standard acceleration of free fall in world axes [m/s²]."""
@@ -23,6 +25,7 @@ GRAVITY = (0.0, 0.0, -9.80665)
 class Library:
     """What the quantities of a robot need; `KinDynComputations` adds the quantities, and describes the arguments."""
 
+    @checked
     def __init__(
         self,
         urdfstring: str | os.PathLike[str],
@@ -42,6 +45,32 @@ class Library:
         self._f_opts = dict(f_opts or {})
         self._made_for = self._representation, *self._gravity
         self._functions: dict[tuple[object, ...], cs.Function] = {}
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether the other is a library of the same robot, gravity, representation and `f_opts`."""
+        return type(self) is type(other) and self._content() == other._content()
+
+    def __hash__(self) -> int:
+        return hash(self.tree)  # which does not change, as gravity may
+
+    def _content(self) -> tuple[Hashable, ...]:
+        return content(self.tree), content(self._gravity), self._representation, content(self._f_opts)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_functions": {}}  # they are made anew where they are asked for
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._gravity = _checked_gravity(self._gravity)
+
+    def __copy__(self) -> Self:
+        return copy.deepcopy(self)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return a library that may change on its own; the tree and the functions, which cannot, are shared."""
+        other = memo[id(self)] = object.__new__(type(self))
+        other.__dict__.update(self.__dict__, _f_opts=dict(self._f_opts), _functions=dict(self._functions))
+        return other
 
     @classmethod
     def from_urdf(
@@ -108,7 +137,7 @@ class Library:
         Raises:
             InputError: gravity is not three finite numbers.
         """
-        other = copy(self)
+        other = copy.copy(self)
         other._gravity = _checked_gravity(gravity)
         return other
 
@@ -147,10 +176,13 @@ class Library:
 
 
 def _checked_gravity(gravity: ArrayLike) -> np.ndarray:
-    vector = np.array(gravity, dtype=float).ravel()
+    try:
+        vector = np.array(gravity, dtype=float).ravel()
+    except Exception as error:  # NumPy and CasADi have no type in common for this
+        raise InputError(f"gravity is {shown(gravity)}; expected three finite numbers, as {GRAVITY}") from error
     if vector.shape == (6,) and not vector[3:].any():  # adam's form
         vector = vector[:3]
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"gravity is {gravity!r}; expected three finite numbers, for example {GRAVITY}")
+        raise InputError(f"gravity is {shown(gravity)}; expected three finite numbers, for example {GRAVITY}")
     vector.flags.writeable = False
     return vector

@@ -22,14 +22,15 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
-from types import MappingProxyType
 from typing import Any, Protocol, TypeVar, cast
 
 import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.library import Library
-from multimodal_to.errors import InputError, ModelError
+from multimodal_to.arguments import check
+from multimodal_to.errors import InputError, ModelError, shown
+from multimodal_to.values import FrozenMapping
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Argument:
     meaning: str
 
 
-ARGUMENTS: Mapping[str, Argument] = MappingProxyType(
+ARGUMENTS: Mapping[str, Argument] = FrozenMapping(
     {
         "base_transform": Argument("H", (4, 4), "w_H_base, world-from-base, (4, 4) [1, m]."),
         "joint_positions": Argument("s", (None, 1), "s, (n, 1) [rad or m], in the order of `joint_names`."),
@@ -105,6 +106,7 @@ def quantity(formula: Formula) -> Formula:
             arguments = signature.bind(self, *given, **named).arguments
         except TypeError as error:
             raise TypeError(f"{name}: {error}") from None
+        check(f"{name}: 'external_wrenches'", arguments.get("external_wrenches"), Mapping[str, Any] | None)
         wrenches = dict(arguments.get("external_wrenches") or {})
         key = [arguments["frame"]] if "frame" in arguments else [tuple(wrenches)] if wrenches else []
         function = getattr(self, f"{name}_fun")(*key)
@@ -137,8 +139,10 @@ def of_state(method: Callable[..., Any], output: str) -> StateFunction:
 
 def of_frame(method: Callable[..., Any], output: str) -> FrameFunction:
     """Return what makes the function of a frame's quantity, with its result named `output`."""
+    formula = inspect.unwrap(method)
 
     def function(self: Library, frame: str) -> cs.Function:
+        check(f"{formula.__name__}: 'frame'", frame, str)
         return _function(self, method, output, frame=frame)
 
     return cast(FrameFunction, _described(function, method, output))
@@ -146,8 +150,10 @@ def of_frame(method: Callable[..., Any], output: str) -> FrameFunction:
 
 def of_wrenches(method: Callable[..., Any], output: str) -> WrenchFunction:
     """Return what makes the function of a quantity under external wrenches, with its result named `output`."""
+    formula = inspect.unwrap(method)
 
     def function(self: Library, frames: Sequence[str] = ()) -> cs.Function:
+        check(f"{formula.__name__}: 'frames'", frames, Sequence[str])
         return _function(self, method, output, pushed=tuple(frames))
 
     return cast(WrenchFunction, _described(function, method, output))
@@ -241,15 +247,21 @@ def _holds_casadi(row: Any) -> bool:
 
 def _checked(function: cs.Function, index: int, argument: Any) -> Any:
     """Return an argument of a function in a form that CasADi takes; refuse a wrong shape, a NaN and an infinity."""
+    expected, name = tuple(function.size_in(index)), function.name_in(index)
     try:
         argument = _assembled(argument)
     except (NotImplementedError, RuntimeError) as error:
-        raise InputError(
-            f"{function.name()}: '{function.name_in(index)}' mixes SX and MX, or rows of other lengths"
-        ) from error
+        raise InputError(f"{function.name()}: '{name}' mixes SX and MX, or rows of other lengths") from error
     symbolic = isinstance(argument, cs.SX | cs.MX)
-    value = argument if symbolic or isinstance(argument, cs.DM) else np.asarray(argument, dtype=float)
-    expected, name = tuple(function.size_in(index)), function.name_in(index)
+    try:
+        real = symbolic or isinstance(argument, cs.DM) or not np.iscomplexobj(argument)
+        value = (
+            argument if symbolic or isinstance(argument, cs.DM) else np.asarray(argument, dtype=float if real else None)
+        )
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{function.name()}: '{name}' is {shown(argument)}; expected numbers, {expected}") from error
+    if not real:
+        raise InputError(f"{function.name()}: '{name}' holds complex numbers; expected real ones")
     if tuple(value.shape) not in (expected, expected[:1] if expected[1] == 1 else expected):
         raise InputError(f"{function.name()}: '{name}' has shape {tuple(value.shape)}; expected {expected}")
     if not symbolic and not np.isfinite(np.asarray(value)).all():

@@ -12,6 +12,8 @@ import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
+from multimodal_to.values import Value
+
 SX = Any
 """A CasADi matrix: SX, MX or DM (CasADi carries no types)."""
 Array = NDArray[np.float64]
@@ -51,8 +53,8 @@ def homogeneous(rotation: SX, translation: SX) -> SX:
     return cs.vertcat(cs.horzcat(rotation, translation), cs.horzcat(cs.DM(1, 3), 1))
 
 
-@dataclass(frozen=True)
-class Inertia:
+@dataclass(frozen=True, eq=False)
+class Inertia(Value):
     """A rigid body's mass [kg], first moment m c [kg m], and inertia about the frame's origin [kg m²], in its frame."""
 
     mass: Any

@@ -10,13 +10,14 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array, Inertia
 from multimodal_to.errors import ModelError, unknown
+from multimodal_to.values import Value
 
 BASE = 0
 """Index of the base in `Tree.bodies`."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Link:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Link(Value):
     """A link of a URDF: mass [kg], CoM [m] and inertia about the CoM [kg m²], both in the link's frame."""
 
     name: str
@@ -41,8 +42,8 @@ class Mimic:
         return f"{factor}{self.joint}{added}"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Joint:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Joint(Value):
     """A joint of a URDF; the child's frame is at (`rotation`, `translation`) [m] in the parent's when it is at zero."""
 
     name: str
@@ -60,8 +61,8 @@ class Joint:
     remarks: tuple[str, ...] = ()  # what the reader had to make up or mend
 
 
-@dataclass(frozen=True, kw_only=True)
-class Body:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Body(Value):
     """A moving body: z is its joint's axis, and (`rotation`, `translation`) its frame in the parent's at q = 0.
 
     Its inertia is the regrouped one, which sums up to the robot's but is not the one of its links.
@@ -83,8 +84,8 @@ class Body:
         return self.multiplier * joints[self.column]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Frame:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Frame(Value):
     """A named frame, fixed in a body."""
 
     body: int
@@ -92,8 +93,8 @@ class Frame:
     translation: cs.DM  # (3, 1) [m], in the body
 
 
-@dataclass(frozen=True, kw_only=True)
-class Tree:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tree(Value):
     """A floating-base robot: body 0 is the base, every other body comes after its parent."""
 
     base: str

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.auditing.findings import Finding, Motion, Worst, largest, worst_of
 from multimodal_to.auditing.integrator import integrator_findings
 from multimodal_to.auditing.margins import margin_findings
@@ -57,6 +58,7 @@ class Audit:
         """Return whether every property holds."""
         return all(finding.holds for finding in self.findings)
 
+    @checked
     def __getitem__(self, name: str) -> Finding:
         """Return a finding by its property's name.
 
@@ -69,6 +71,7 @@ class Audit:
         return by_name[name]
 
 
+@checked
 def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None) -> Audit:
     """Check a trajectory against the physics of its robot.
 
@@ -197,7 +200,9 @@ def _kinematics(motion: Motion) -> list[Worst]:
 def _dynamics(motion: Motion) -> list[Worst]:
     """Newton and Euler for the whole robot at the instants of the knots."""
     robot, trajectory = motion.robot, motion.trajectory
-    contacts = at_knots(trajectory, "contact_forces").reshape(len(robot.contacts), 3, -1).transpose(0, 2, 1)
+    contacts = (
+        at_knots(trajectory, "contact_forces").reshape(len(robot.contacts), 3, trajectory.time.size).transpose(0, 2, 1)
+    )
     acting = np.concatenate([contacts, motion.thrusts])
     points = np.concatenate([motion.points, motion.thrust_points])
     linear = acting.sum(axis=0) + robot.mass * robot.gravity - robot.mass * at_knots(trajectory, "com_acceleration").T

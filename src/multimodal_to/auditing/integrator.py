@@ -162,7 +162,7 @@ class Controls:
         robot, plan, jets = self.robot, self.trajectory, len(self.robot.jets)
         thrust, rate = states[:, _THRUSTS : _THRUSTS + jets], states[:, _THRUSTS + jets :]
         rotation = rotations(states[:, _RHO])
-        contacts = plan.contact_forces.reshape(len(robot.contacts), 3, -1).transpose(2, 0, 1)[columns]
+        contacts = plan.contact_forces.reshape(len(robot.contacts), 3, plan.time.size).transpose(2, 0, 1)[columns]
         thrusts = thrust[:, :, None] * np.einsum("sij,scj->sci", rotation, self.directions[instants])
         arms = np.einsum("sij,scj->sci", rotation, self.jets[instants])
         acceleration = robot.gravity + (contacts.sum(axis=1) + thrusts.sum(axis=1)) / robot.mass
@@ -222,7 +222,7 @@ class Controls:
         quaternions, _ = spline(plan.time, plan.base_quaternion_xyzw.T, instants)
         thrusts = np.einsum("kij,kcj,kc->ki", rotations(quaternions), self.directions, thrust)
         columns = (np.arange(plan.knots)[:, None] + self.columns).ravel()
-        contacts = plan.contact_forces.reshape(len(robot.contacts), 3, -1).sum(axis=0).T[columns]
+        contacts = plan.contact_forces.reshape(len(robot.contacts), 3, plan.time.size).sum(axis=0).T[columns]
         step = (np.repeat(np.diff(plan.time), self.steps) / self.steps)[:, None]
         starts, middles, ends = (
             robot.gravity + (contacts + part) / robot.mass for part in (thrusts[:-2:2], thrusts[1::2], thrusts[2::2])

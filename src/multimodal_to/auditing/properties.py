@@ -10,7 +10,6 @@ for every robot, so that these limits are in the property's unit. The others are
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from multimodal_to.auditing.margins import MARGINS
 from multimodal_to.auditing.property import Judged, Of, Property
@@ -19,6 +18,7 @@ from multimodal_to.errors import InputError, unknown
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory.derived import LOADED_SHARE
+from multimodal_to.values import FrozenMapping
 
 _FEASIBLE = "what a feasible motion may miss its row by, the same for every robot"
 _TWICE_FEASIBLE = "twice what a feasible motion may miss its row by, the same for every robot"
@@ -450,7 +450,7 @@ _TASK = (
     *_equilibrium("end", Judged.HOVERING_END),
 )
 
-PROPERTIES: Mapping[str, Property] = MappingProxyType(
+PROPERTIES: Mapping[str, Property] = FrozenMapping(
     {
         entry.name: entry
         for entry in (*_PHYSICS, *_INTEGRATION, *_ACTUATION_AND_CONTACT, *_ORDER, *SELF_COLLISION, *MARGINS, *_TASK)

@@ -19,10 +19,11 @@ from multimodal_to.errors import OutputError
 from multimodal_to.models.capsule_pairs import FEWEST_JOINTS, joints_between, poses_in_base
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.values import Value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Solid:
+class Solid(Value):
     """A convex part of a link."""
 
     link: str

@@ -7,9 +7,8 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Motion, Worst, worst_of
 from multimodal_to.models.attitude import tilt
-from multimodal_to.models.terrain import frame_function
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
-from multimodal_to.trajectory.derived import at_knots, without_acceleration
+from multimodal_to.trajectory.derived import at_knots, surface_frames, without_acceleration
 
 _SPEEDS = ("com_velocity", "base_linear_velocity", "base_angular_velocity", "joint_velocities")
 
@@ -102,9 +101,8 @@ def _standing(when: str, motion: Motion, knot: int, scenario: Scenario) -> list[
         knot: at which.
         scenario: with the ground.
     """
-    points = motion.points[:, knot].T
-    heights = np.array(frame_function(scenario.surface).map(points.shape[1])(points)[0])
-    return [worst_of(f"{when}: feet off the ground", np.abs(heights).T, motion.robot.contact_names, knot)]
+    heights = surface_frames(scenario.surface, motion.points[:, knot])[0]
+    return [worst_of(f"{when}: feet off the ground", np.abs(heights)[:, None], motion.robot.contact_names, knot)]
 
 
 def _hover(when: str, motion: Motion, knot: int) -> list[Worst]:

@@ -1,7 +1,7 @@
 """The command line, `multimodal-to`: the only part of the library that prints.
 
 Exit status: 0 when done, 1 when a solve ended without an answer, an audit found something or a simulated
-robot fell, 2 on bad input or a hopeless task.
+robot fell, 2 on bad input or a hopeless task, 130 when Ctrl-C ended the command.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ import typer
 from multimodal_to.cli import solving, showing, judging  # noqa: F401
 
 # isort: on
+from multimodal_to import ending
+from multimodal_to.cli import streams
 from multimodal_to.cli.common import app, out, remove_unused, say
 from multimodal_to.errors import MultimodalError
 
@@ -27,8 +29,10 @@ __all__ = ["app", "main"]
 def main() -> None:
     """Run the command line; errors of the library end in one sentence and exit status 2."""
     warnings.showwarning = _show_warning  # type: ignore[assignment]
+    streams.fit()
     try:
-        app()
+        with ending.handled(), ending.cleaned(remove_unused):
+            app()
     except MultimodalError as error:
         say("error", "bold red", str(error))
         sys.exit(2)

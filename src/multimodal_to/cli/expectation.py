@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from multimodal_to.scenarios import SCENARIOS
 from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.values import FrozenMapping
 
-TYPICAL_ITERATIONS: Mapping[str, int] = MappingProxyType(
+TYPICAL_ITERATIONS: Mapping[str, int] = FrozenMapping(
     {"take-off": 57, "take-off-and-landing": 128, "landing": 79, "walk-to-fly": 143, "jump": 135, "step-up": 154}
 )
 """Iterations of the bundled scenarios, as plans that the robot carries out, in the run that README's table shows."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from dataclasses import asdict
@@ -17,6 +16,7 @@ from multimodal_to.adam.inspection import describe
 from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.cli.common import File, RobotOption, app, described, loaded, number_option, out, writable
 from multimodal_to.cli.completion import robots_or_urdfs
+from multimodal_to.cli.streams import print_json
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import load_robot
 from multimodal_to.trajectory.conditions import differences
@@ -45,7 +45,7 @@ def audit_file(
     others = differences(the_robot, trajectory)
     if as_json:
         more = {"formulation": unusual, "planned_for": list(others)}
-        typer.echo(json.dumps({**_as_data(report), **more}, indent=2, ensure_ascii=False))
+        print_json({**_as_data(report), **more})
         raise typer.Exit(0 if report.holds else 1)
     narrow = [Column(title, no_wrap=True) for title in ("property", "worst", "limit", "unit", "knot")]
     table = Table(*narrow, "where", Column(no_wrap=True), box=None, pad_edge=False)

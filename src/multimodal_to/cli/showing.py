@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from multimodal_to import ending
 from multimodal_to.cli.common import (
     File,
     RobotOption,
@@ -127,8 +128,9 @@ def replay(
     out.print(f"replaying at {visualizer.url()}; Ctrl-C ends", soft_wrap=True)
     visualizer.open()
     try:
-        while True:
-            time.sleep(1.0)
+        with ending.raised():
+            while True:
+                time.sleep(1.0)
     except KeyboardInterrupt:
         out.print()
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from dataclasses import asdict
@@ -32,10 +31,11 @@ from multimodal_to.cli.common import (
 )
 from multimodal_to.cli.expectation import expect
 from multimodal_to.cli.progress import Progress
+from multimodal_to.cli.streams import print_json, print_toml
 from multimodal_to.cli.tasks import free_checkpoint, given
 from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
-from multimodal_to.errors import InputError, ScenarioError
+from multimodal_to.errors import InputError, ScenarioError, apart
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.native import missing
 from multimodal_to.ocp import Formulation, build
@@ -45,7 +45,7 @@ from multimodal_to.scenarios import paper as as_in_paper
 from multimodal_to.scenarios.data import stored, to_dict
 from multimodal_to.scenarios.files import change, to_toml
 from multimodal_to.scenarios.scenario import Scenario
-from multimodal_to.solving import Ipopt, Relaxation, Solution, relax
+from multimodal_to.solving import Ipopt, Relaxation, Solution, Status, relax
 from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
 from multimodal_to.trajectory import Trajectory
@@ -109,7 +109,7 @@ def show(
         raise ScenarioError(f"'{name}' keeps no scenario")
     if trajectory is not None and (unusual := trajectory.unusual_formulation()):
         out.print(f"# the problem had {unusual}; a scenario does not hold these", soft_wrap=True)
-    out.print(to_toml(change(scenario, settings or ())), soft_wrap=True, end="")
+    print_toml(to_toml(change(scenario, settings or ())))
 
 
 def _show_torques(file: Path, robot: str) -> None:
@@ -152,7 +152,7 @@ def doctor(
     if as_json:
         findings = [asdict(finding) | {"severity": finding.severity.value} for finding in diagnosis.findings]
         data = {"task": name, "robot": the_robot.name, "hopeless": diagnosis.hopeless, "findings": findings}
-        typer.echo(json.dumps(data, indent=2, ensure_ascii=False))
+        print_json(data)
     else:
         for finding in diagnosis.findings:
             out.print(f"{finding.severity.value}: {finding}", soft_wrap=True)
@@ -229,7 +229,8 @@ def solve(
     the_robot = load_robot(task.robot)
     if resume is not None and task.start is not None:
         the_robot = under_conditions(the_robot, task.start)
-    _refuse_hopeless(examine(the_robot, scenario, task.formulation), console, force)
+    diagnosis = examine(the_robot, scenario, task.formulation)
+    _refuse_hopeless(diagnosis, console, force)
     folder = writable(output or (Path("results") / scenario.name if resume is None else resume.parent))
     started = time.perf_counter()
     problem = build(the_robot, scenario, task.formulation)
@@ -255,6 +256,7 @@ def solve(
         kept.unlink(missing_ok=True)
     report = audit(the_robot, solution.trajectory, scenario)
     _summarise(console, solution, report)
+    _repeat(console, solution, diagnosis)
     if explain and not solution.status.solved and not progress.interrupted:
         _explain(console, relax(problem, solution.trajectory, solver))
     if not (no_pictures or progress.interrupted):  # who stops a solve does not want to wait for pictures
@@ -263,6 +265,13 @@ def solve(
         console.print(f"wrote {path}", soft_wrap=True)
     if not solution.status.solved:
         raise typer.Exit(1)
+
+
+def _repeat(console: Console, solution: Solution, diagnosis: Diagnosis) -> None:
+    """Say again what the doctor said, where there is no answer."""
+    if solution.status in (Status.INFEASIBLE, Status.FAILED):
+        for finding in diagnosis.of(Severity.ERROR) + diagnosis.of(Severity.WARNING):
+            console.print(f"the doctor said: {finding}", soft_wrap=True)
 
 
 def _explain(console: Console, relaxation: Relaxation) -> None:
@@ -301,8 +310,8 @@ def _summarise(console: Console, solution: Solution, report: Audit) -> None:
     failed = [finding for finding in report.findings if not finding.holds]
     for finding in failed:
         console.print(
-            f"audit: {finding.name} is {finding.worst:.2e} {finding.unit} at knot {finding.knot} {finding.body}, "
-            f"more than {finding.limit:g}",
+            f"audit: {finding.name} is {apart(finding.worst, finding.limit)} {finding.unit} at knot {finding.knot} "
+            f"{finding.body}, more than {finding.limit:g}",
             soft_wrap=True,
         )
     if not failed:

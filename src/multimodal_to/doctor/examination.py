@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from multimodal_to.arguments import checked
 from multimodal_to.doctor.diagnosis import Diagnosis, Symptom, error
 from multimodal_to.doctor.formulation import formulation
 from multimodal_to.doctor.ground import height, hold
@@ -40,6 +41,7 @@ ONCE_SOUND: tuple[Check, ...] = (formulation,)
 """What is asked of a task in which the others found no error: it needs a problem that can be made."""
 
 
+@checked
 def doctor(robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> Diagnosis:
     """Return what can be said of a task before its problem is built and solved, in about a second.
 

@@ -12,6 +12,7 @@ from multimodal_to.doctor.balance import LONG_LEVER, com_of, residual
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.search import search
 from multimodal_to.doctor.task import Task
+from multimodal_to.errors import apart
 from multimodal_to.models.robot import Posture
 from multimodal_to.models.terrain import FlatGround, frame_function
 from multimodal_to.ocp import paper
@@ -44,7 +45,7 @@ def height(task: Task) -> Iterator[Symptom]:
         if task.held(paper.CONTACT_REACH) and above > reach:
             yield error(
                 "standing end",
-                f"the CoM has to end {above:.3g} m above the feet, beyond the reach of contact "
+                f"the CoM has to end {apart(above, reach)} m above the feet, beyond the reach of contact "
                 f"points in the problem, {reach:g} m ('contacts' in [reach] of robot.toml)",
                 _other_height(task, "final"),
             )
@@ -60,8 +61,10 @@ def _no_posture(task: Task, com: Vector3) -> str:
 def _other_height(task: Task, which: str) -> str:
     com: Vector3 = getattr(task.scenario, f"{which}_com")
     reached = _nearest_height(task, com)
-    hint = "" if reached is None else f"; the nearest that the legs are found to reach is {reached:.3f} m"
-    return f"choose another {which}_com_height{hint}"
+    if reached is None:
+        return f"choose another {which}_com_height"
+    height = apart(reached, com[2], digits=5)
+    return f"choose another {which}_com_height; the nearest that the legs are found to reach is {height} m"
 
 
 def _nearest_height(task: Task, com: Vector3) -> float | None:

@@ -11,6 +11,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.doctor.balance import knot_of
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.task import Task
+from multimodal_to.errors import apart
 from multimodal_to.ocp import paper
 from multimodal_to.ocp.terms import Constraint
 
@@ -45,9 +46,10 @@ def _beyond(task: Task, term: Constraint, names: tuple[str, ...], limits: Array,
     point, axis = np.unravel_index(int(arms.argmax()), arms.shape)
     # A robot without moving joints that has to be upright somewhere can bring nothing nearer there.
     certain = task.rigid and bool(task.hovers) and _upright(task)
+    away = apart(arms[point, axis] * limits[axis], limits[axis])
     yield (error if certain else warning)(
         "reach",
-        f"{names[point]} is {arms[point, axis] * limits[axis]:.3g} m from the CoM along {'xyz'[axis]} in the posture "
+        f"{names[point]} is {away} m from the CoM along {'xyz'[axis]} in the posture "
         f"that the problem is built around, and the problem allows {limits[axis]:g} m",
         f"bring it nearer, or widen '{key}' in the [reach] of the robot's robot.toml",
     )

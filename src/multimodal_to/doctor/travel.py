@@ -9,6 +9,7 @@ import numpy as np
 
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.task import Task
+from multimodal_to.errors import apart
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.scenarios.scenario import Terminal
 
@@ -37,8 +38,9 @@ def speed(task: Task) -> Iterator[Symptom]:
     certain = distance - _LIMBS * task.robot.contact_reach[2] > furthest(intervals + 1) or intervals <= 0
     yield (error if certain else warning)(
         "time for the distance",
-        f"the CoM has to go {distance:.3g} m {label} in at most {intervals * scenario.interval_max:.3g} s ({intervals} "
-        f"intervals in which it can move), and base_speed_max is {scenario.base_speed_max:g} m/s",
+        f"the CoM has to go {apart(distance, furthest(intervals))} m {label} in at most "
+        f"{intervals * scenario.interval_max:.4g} s ({intervals} intervals in which it can move), and "
+        f"base_speed_max is {scenario.base_speed_max:g} m/s",
         "allow more knots, a longer interval_max or more speed",
     )
 
@@ -59,8 +61,9 @@ def push(task: Task) -> Iterator[Symptom]:
     if way.max() > furthest:
         yield error(
             "time for the distance",
-            f"the CoM has to go {way.max():.3g} m along {'xy'[int(way.argmax())]} in at most {moving * step:.3g} s, "
-            f"and friction, {friction:g}, moves it by at most {furthest:.3g} m from rest to rest",
+            f"the CoM has to go {apart(way.max(), furthest)} m along {'xy'[int(way.argmax())]} in at most "
+            f"{moving * step:.4g} s, and friction, {friction:g}, "
+            f"moves it by at most {apart(furthest, way.max())} m from rest to rest",
             "allow more knots, a longer interval_max or more friction",
         )
 

@@ -6,7 +6,6 @@ import csv
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from multimodal_to.models.joint_units import described
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import QUANTITIES, Quantity, Trajectory, labels, row_labels, row_units
 from multimodal_to.trajectory.derived import JOINT_TORQUES, base_poses, joint_torques, sampled
+from multimodal_to.values import FrozenMapping
 
 _NAMES = ("joint_names", "contact_names", "jet_names")
 _RATES = (
@@ -277,7 +277,7 @@ def _in_base(trajectory: Trajectory, name: str) -> Array:
 
 
 Writer = Callable[[Robot, Trajectory, str | os.PathLike[str]], Path]
-EXPORTS: Mapping[str, tuple[str, Writer]] = MappingProxyType(
+EXPORTS: Mapping[str, tuple[str, Writer]] = FrozenMapping(
     {
         "csv": (".csv", write_csv),
         "mat": (".mat", write_mat),

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
+from multimodal_to import ending
 from multimodal_to.errors import OutputError
 
 
@@ -25,14 +28,27 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=target.suffix)
         os.close(handle)
         draft = Path(name)
-        try:
-            yield draft
-            draft.chmod(0o644)
-            draft.replace(target)
-        finally:
-            draft.unlink(missing_ok=True)
+        with ending.cleaned(draft.unlink):
+            try:
+                yield draft
+                draft.chmod(0o644)
+                draft.replace(target)
+            finally:
+                draft.unlink(missing_ok=True)
     except OSError as error:
         raise OutputError(f"cannot write '{target}': {error.strerror or error}") from error
+
+
+@contextmanager
+def scratch(folder: str | os.PathLike[str] | None = None) -> Iterator[Path]:
+    """Make a folder for files that are not kept, by default where the system has such folders; it goes at the end."""
+    made = Path(tempfile.mkdtemp(dir=folder))
+    remove = partial(shutil.rmtree, made, ignore_errors=True)
+    with ending.cleaned(remove):
+        try:
+            yield made
+        finally:
+            remove()
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> Path:

@@ -18,6 +18,7 @@ import numpy as np
 from multimodal_to.adam.kinematics import Pose
 from multimodal_to.adam.spatial import SX, Array
 from multimodal_to.errors import ModelError, shown
+from multimodal_to.values import Value
 
 PULL = 0.02
 """How strongly nearest points are pulled to the middles of their segments, as a share of their squared lengths [1]."""
@@ -31,7 +32,7 @@ their squared lengths [1]; so measured over random, parallel, crossing and touch
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Capsule:
+class Capsule(Value):
     """All points within `radius` of a segment that is fixed in a frame of the robot.
 
     Raises:

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 
 import casadi as cs
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from multimodal_to.adam import KinDynComputations, quaternion
 from multimodal_to.adam.inspection import is_placeholder
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
 from multimodal_to.files.reading import read_toml
 from multimodal_to.files.records import Records
@@ -26,6 +26,7 @@ from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import Jet
 from multimodal_to.models.proportions import Gait
 from multimodal_to.models.robot_keys import JetTable, JointTable, RobotFile
+from multimodal_to.values import FrozenMapping, Value
 
 ROBOT_FILE = "robot.toml"
 _RECORDS = Records(what="the robot", error=ModelError)
@@ -34,7 +35,7 @@ NamePairs = frozenset[frozenset[str]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Posture:
+class Posture(Value):
     """A configuration of the robot: base in the world and joints; of ρ and −ρ it keeps the one of `attitude.signed`."""
 
     base_position: Array  # (3,) [m]
@@ -42,7 +43,8 @@ class Posture:
     joint_positions: Array  # (n,) [rad or m]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "base_quaternion_xyzw", attitude.signed(self.base_quaternion_xyzw))
+        super().__post_init__()
+        self.__setstate__({"base_quaternion_xyzw": attitude.signed(self.base_quaternion_xyzw)})
 
     @property
     def base_transform(self) -> Array:
@@ -54,7 +56,7 @@ class Posture:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class JointLimits:
+class JointLimits(Value):
     """Ranges to plan in, each (n,) in the order of the joints."""
 
     lower: Array  # [rad or m]
@@ -64,7 +66,7 @@ class JointLimits:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Robot:
+class Robot(Value):
     """Everything that depends on the robot and not on the task."""
 
     name: str
@@ -194,6 +196,7 @@ class Robot:
                 )
         return tuple(pair for names, pair in by_names.items() if names in self.held_pairs)
 
+    @checked
     def with_jets(self, names: Sequence[str]) -> Robot:
         """Return the robot with only the jets of these names, in this order; with none it has none to use.
 
@@ -206,6 +209,7 @@ class Robot:
                 raise ModelError(unknown("jet", name, known))
         return replace(self, jets=tuple(known[name] for name in names))
 
+    @checked
     def with_gravity(self, gravity: Sequence[float] | Array) -> Robot:
         """Return the robot under another gravity: three numbers in world axes [m/s²].
 
@@ -214,6 +218,7 @@ class Robot:
         """
         return replace(self, kindyn=self.kindyn.with_gravity(gravity))
 
+    @checked
     def group_indices(self, group: str) -> list[int]:
         """Return where the joints of a named group stand in s.
 
@@ -233,6 +238,7 @@ def bundled_robots() -> dict[str, Path]:
     return {path.parent.name: path.parent for path in sorted(folder.glob(f"*/{ROBOT_FILE}"))}
 
 
+@checked
 def load_robot(robot: str | os.PathLike[str]) -> Robot:
     """Load a bundled robot by name, or any other from its folder.
 
@@ -272,7 +278,7 @@ def _robot(file: RobotFile, folder: Path) -> Robot:
         name=file.name,
         urdf=urdf,
         kindyn=kindyn,
-        joint_groups=MappingProxyType(dict(file.joint_groups)),
+        joint_groups=FrozenMapping(file.joint_groups),
         joint_limits=_limits(file, kindyn),
         contacts=contacts,
         friction=file.contact.friction,

@@ -9,6 +9,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
+from multimodal_to.values import Value
 
 PRESSURE_SLACK = 0.002
 """Moment about an edge of a sole that a plan may lack, so that a foot without load is inside the set [m g L]."""
@@ -17,7 +18,7 @@ _FLAT = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sole:
+class Sole(Value):
     """Contact points of one body that span a plane."""
 
     foot: str

@@ -9,10 +9,11 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Posture, Robot
+from multimodal_to.values import Value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class State:
+class State(Value):
     """Where a robot is and how it moves at an instant; vectors are in world axes.
 
     Raises:
@@ -44,6 +45,7 @@ class State:
         for name, other in (("joint_velocities", "joint_positions"), ("thrust_rate", "thrust")):
             if getattr(self, name).size != getattr(self, other).size:
                 raise InputError(f"the state has {getattr(self, name).size} {name}; expected as many as {other}")
+        super().__post_init__()
 
     @classmethod
     def at_rest(cls, robot: Robot, posture: Posture | None = None, thrust: Array | None = None) -> State:

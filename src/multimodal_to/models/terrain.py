@@ -10,15 +10,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 from typing import Protocol
 
 import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import SX, Array
+from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import InputError
 from multimodal_to.models import bspline
+from multimodal_to.values import FrozenMapping
 
 Vector2 = tuple[float, float]
 
@@ -45,6 +46,10 @@ class FlatGround:
 
     height: float = 0.0
     """z of the ground [m]."""
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        _finite("height", self.height)
 
     def distance(self, point: SX) -> SX:
         """Return the height of a point above the plane [m]."""
@@ -97,6 +102,15 @@ class CachedSurface:
         self._surface = surface
         self._known: dict[int, tuple[SX, tuple[SX, SX, SX]]] = {}  # with the point, so that its id stays its own
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, CachedSurface) and self._surface == other._surface
+
+    def __hash__(self) -> int:
+        return hash((CachedSurface, self._surface))
+
+    def __reduce__(self) -> tuple[type[CachedSurface], tuple[Surface]]:
+        return CachedSurface, (self._surface,)
+
     def _frame(self, point: SX) -> tuple[SX, SX, SX]:
         if id(point) not in self._known:
             self._known[id(point)] = point, frame(self._surface, point)
@@ -131,9 +145,11 @@ class Plane(Relief):
     """z of the plane at the world's origin [m]."""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         _finite("slope", self.slope)
         _finite("height", self.height)
         _unit(self.direction)
+        _as_tuples(self, "direction")
 
     def height_and_slopes(self, x: SX, y: SX) -> tuple[SX, SX, SX]:
         """Return h [m] and the constant slopes [1]."""
@@ -162,7 +178,9 @@ class Stairs(Relief):
     """Width of the ramp that smooths a riser [m]."""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         _unit(self.direction)
+        _as_tuples(self, "direction", "edges", "heights")
         _finite("edges", *self.edges)
         _finite("heights", *self.heights)
         if not self.edges or len(self.heights) != len(self.edges) + 1:
@@ -210,7 +228,11 @@ class HeightField(Relief):
     """z of the nodes, one list for each x and one number in it for each y [m]."""
 
     def __post_init__(self) -> None:
-        for label, (low, high) in (("x_range", self.x_range), ("y_range", self.y_range)):
+        check_fields(self)
+        for label, ends in (("x_range", self.x_range), ("y_range", self.y_range)):
+            if len(ends) != 2:
+                raise InputError(f"{label} of the height field has {len(ends)} numbers; expected two")
+            low, high = ends
             if not -math.inf < low < high < math.inf:
                 raise InputError(f"{label} of the height field is {low} to {high} m; expected finite numbers that rise")
         lengths = {len(row) for row in self.heights}
@@ -224,8 +246,10 @@ class HeightField(Relief):
             raise InputError(f"the height field has {nodes} nodes; expected at most {MOST_NODES}")
         _finite("heights", *(number for row in self.heights for number in row))
         object.__setattr__(self, "heights", tuple(tuple(map(float, row)) for row in self.heights))
+        _as_tuples(self, "x_range", "y_range")
 
     @classmethod
+    @checked
     def sampled(
         cls, height: Callable[[float, float], float], *, x_range: Vector2, y_range: Vector2, spacing: float
     ) -> HeightField:
@@ -243,7 +267,7 @@ class HeightField(Relief):
             np.linspace(low, high, max(bspline.LEAST_NODES, math.ceil((high - low) / spacing - 1e-9) + 1)).tolist()
             for low, high in (x_range, y_range)
         )
-        heights = tuple(tuple(float(height(at_x, at_y)) for at_y in y) for at_x in x)
+        heights = tuple(tuple(height(at_x, at_y) for at_y in y) for at_x in x)
         return cls(x_range=x_range, y_range=y_range, heights=heights)
 
     @cached_property
@@ -262,7 +286,7 @@ class HeightField(Relief):
 MOST_NODES = 40_000
 """The most nodes of a height field: with more, expressions take minutes to build."""
 
-SURFACES: Mapping[str, type[FlatGround | Plane | Stairs | HeightField]] = MappingProxyType(
+SURFACES: Mapping[str, type[FlatGround | Plane | Stairs | HeightField]] = FrozenMapping(
     {"flat": FlatGround, "plane": Plane, "stairs": Stairs, "height-field": HeightField}
 )
 """The surfaces that a scenario's file can name, by their kind."""
@@ -282,15 +306,37 @@ def frame_function(surface: Surface) -> cs.Function:
     return cs.Function("surface", [point], parts, ["p"], ["d", "n", "t"])
 
 
+def uphill(surface: Surface) -> Vector2 | None:
+    """Return the horizontal unit direction that alone changes the ground's height, upwards; None where there is none.
+
+    Across it the ground is the same everywhere.
+    """
+    if isinstance(surface, Plane):
+        unit_x, unit_y = _unit(surface.direction)
+        return (unit_x, unit_y) if surface.slope >= 0.0 else (-unit_x, -unit_y)
+    if isinstance(surface, Stairs):
+        unit_x, unit_y = _unit(surface.direction)
+        return (unit_x, unit_y) if surface.heights[-1] >= surface.heights[0] else (-unit_x, -unit_y)
+    return None
+
+
 def heights_below(surface: Surface, points: Array) -> Array:
     """Return the surface's z [m] below or above points (3, count): where d = 0, along the vertical.
 
     One step of Newton's method from each point, which is exact for a surface whose d is linear in z, as all here are.
     """
+    if not points.shape[1]:  # which CasADi does not map over
+        return np.zeros(0)
     point = cs.SX.sym("p", 3)
     distance = cs.SX(surface.distance(point))
     step = cs.Function("step", [point], [distance / cs.jacobian(distance, point)[2]])
     return np.asarray(points[2] - np.array(step.map(points.shape[1])(points)).ravel())
+
+
+def _as_tuples(surface: Plane | Stairs | HeightField, *names: str) -> None:
+    """Keep sequences of numbers as tuples of floats, which hash and equal whatever they were given as."""
+    for name in names:
+        object.__setattr__(surface, name, tuple(map(float, getattr(surface, name))))
 
 
 def _finite(label: str, *numbers: float) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.terrain import Surface, heights_below
+from multimodal_to.values import Value
 
 CELL = 0.05
 """Side of the cells that the patch is made of [m]."""
@@ -17,7 +18,7 @@ LINE_EVERY = 5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Patch:
+class Patch(Value):
     """Nodes of a square grid on a surface, triangles between them, and lines along it."""
 
     vertices: Array  # (n, 3) [m], world

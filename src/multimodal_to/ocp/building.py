@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import copyreg
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import FormulationError, listed
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
@@ -21,6 +24,7 @@ from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.scenario import Scenario
 
 
+@checked
 def build(
     robot: Robot, scenario: Scenario, formulation: Formulation | None = None, *, initial: State | None = None
 ) -> Problem:
@@ -76,6 +80,18 @@ def build(
     )
     _refuse_no_numbers(problem, outline.stages)
     return problem
+
+
+def _again(robot: Robot, scenario: Scenario, formulation: Formulation, initial: State | None) -> Problem:
+    return build(robot, scenario, formulation, initial=initial)
+
+
+def _built_again(problem: Problem) -> tuple[Callable[..., Problem], tuple[Any, ...]]:
+    """Return how pickle makes a problem: CasADi's expressions do not travel, and what they are built from does."""
+    return _again, (problem.robot, problem.scenario, problem.formulation, problem.initial)
+
+
+copyreg.pickle(Problem, _built_again)
 
 
 def _row_bounds(stages: Sequence[NamedStage]) -> tuple[Array, Array, dict[str, RowSet]]:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import casadi as cs
 import numpy as np
@@ -170,6 +170,12 @@ class Evaluation(cs.Callback):  # type: ignore[misc]
         self._tapes = [None if library() is None else block.tape for block in self._blocks]
         self._horizon = None if library() is None else self._native()
         self.construct(name, {})
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self  # it does not change, so that copies of a problem share it
 
     def _native(self) -> Horizon:
         horizon = Horizon(len(self._outputs))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from multimodal_to.arguments import check, check_fields, checked
 from multimodal_to.errors import FormulationError, listed, shown, unknown
 from multimodal_to.ocp import margins, paper
 from multimodal_to.ocp.integration import BACKWARD_EULER, LEAPFROG, IntegrationRule
@@ -31,6 +32,10 @@ class Formulation:
     interval_scale: float = INTERVAL_SCALE  # the size of Δt that the solver sees as one [s]
 
     def __post_init__(self) -> None:
+        check_fields(self, FormulationError, but=("terms",))
+        check("terms", self.terms, Sequence, FormulationError)
+        object.__setattr__(self, "terms", tuple(self.terms))
+        object.__setattr__(self, "variables", tuple(self.variables))
         for term in self.terms:
             if not isinstance(term, Constraint | Cost):
                 raise FormulationError(f"{shown(term)} is no term; expected a Constraint or a Cost")
@@ -87,6 +92,7 @@ class Formulation:
     def _usual(self) -> Formulation:
         return Formulation.executable() if self.rule == LEAPFROG else Formulation.paper()
 
+    @checked
     def with_terms(self, *terms: Term) -> Formulation:
         """Return the formulation with more terms.
 
@@ -95,6 +101,7 @@ class Formulation:
         """
         return replace(self, terms=(*self.terms, *terms))
 
+    @checked
     def without(self, *names: str) -> Formulation:
         """Return the formulation without the terms of these names.
 
@@ -107,6 +114,7 @@ class Formulation:
                 raise FormulationError(unknown("term", name, known))
         return replace(self, terms=tuple(term for term in self.terms if term.name not in names))
 
+    @checked
     def with_scales(self, scales: Mapping[str, float]) -> Formulation:
         """Return the formulation with other sizes of variables that the solver sees as one, by name [own unit].
 
@@ -121,6 +129,7 @@ class Formulation:
         return replace(self, variables=tuple(changed))
 
     @classmethod
+    @checked
     def of_rule(cls, name: str) -> Formulation:
         """Return the formulation that integrates by the rule of a name, as a trajectory's file says it.
 

@@ -11,6 +11,7 @@ from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import SX
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.trajectory import rules
+from multimodal_to.values import Value
 
 KnotQuantity = Callable[[Knot], SX]
 """A quantity as a function of a knot, (m, 1)."""
@@ -138,8 +139,8 @@ class Leapfrog:
 LEAPFROG = Leapfrog()
 
 
-@dataclass(frozen=True)
-class Interval:
+@dataclass(frozen=True, eq=False)
+class Interval(Value):
     """Two knots in sequence, the time between them, and the rule that ties them."""
 
     start: Knot

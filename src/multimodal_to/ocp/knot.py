@@ -13,10 +13,11 @@ from multimodal_to.adam.spatial import SX
 from multimodal_to.models.centroidal import momentum_rate, thrust_force
 from multimodal_to.models.robot import Robot
 from multimodal_to.ocp.lifting import Lift, not_lifted
+from multimodal_to.values import Value
 
 
-@dataclass(frozen=True)
-class Knot:
+@dataclass(frozen=True, eq=False)
+class Knot(Value):
     """The variables of one knot as SX columns, in their own units; world axes unless said."""
 
     robot: Robot

@@ -6,7 +6,7 @@ Each is a short function of a knot or of an interval; a margin of zero leaves it
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import casadi as cs
 import numpy as np
@@ -107,8 +107,38 @@ def touch_down(interval: Interval, parameters: Parameters) -> SX:
     return cs.vertcat(*rows) / robot.standing_height
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """Whether the scenario asks for a margin; a value, so that terms compare and can be pickled."""
+
+    name: str
+
+    def __call__(self, parameters: Parameters) -> bool:
+        return bool(getattr(parameters.scenario.margins, self.name) > 0.0)
+
+
 def _asked(name: str) -> Callable[[Parameters], bool]:
-    return lambda parameters: getattr(parameters.scenario.margins, name) > 0.0
+    return _Asked(name)
+
+
+def _torque(parameters: Parameters) -> float:
+    return parameters.scenario.margins.torque
+
+
+def _torque_other_way(parameters: Parameters) -> float:
+    return -parameters.scenario.margins.torque
+
+
+def _limited_joint_names(parameters: Parameters) -> tuple[str, ...]:
+    return tuple(parameters.robot.joint_names[index] for index in limited_joints(parameters.robot))
+
+
+def _contact_names(parameters: Parameters) -> tuple[str, ...]:
+    return parameters.robot.contact_names
+
+
+def _distance(parameters: Parameters) -> float:
+    return parameters.scenario.margins.distance * parameters.robot.standing_height
 
 
 def _edges(parameters: Parameters) -> tuple[str, ...]:
@@ -118,12 +148,10 @@ def _edges(parameters: Parameters) -> tuple[str, ...]:
 
 JOINT_TORQUES = Constraint(
     value=joint_torques,
-    within=between(
-        lambda parameters: -parameters.scenario.margins.torque, lambda parameters: parameters.scenario.margins.torque
-    ),
+    within=between(_torque_other_way, _torque),
     unit="1",
     holds=Where.EVERY_INTERVAL,
-    labels=lambda parameters: tuple(parameters.robot.joint_names[index] for index in limited_joints(parameters.robot)),
+    labels=_limited_joint_names,
     when=_asked("torque"),
 )
 FRICTION_CONE = replace(paper.FRICTION_CONE, value=friction_cone)
@@ -142,13 +170,13 @@ TOUCH_DOWN = Constraint(
     unit="1",
     holds=Where.EVERY_INTERVAL,
     scale=0.1,
-    labels=lambda parameters: parameters.robot.contact_names,
+    labels=_contact_names,
     when=_asked("touch_down_speed"),
 )
 
 LINK_DISTANCES = Constraint(
     value=link_distances,
-    within=at_least(lambda parameters: parameters.scenario.margins.distance * parameters.robot.standing_height),
+    within=at_least(_distance),
     unit="m",
     scale=0.1,
     labels=link_pair_labels,

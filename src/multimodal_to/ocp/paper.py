@@ -6,7 +6,7 @@ They are made as a user's own terms are. The first few places matter: rows and c
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,9 +41,56 @@ FORCE = 50.0
 """Size of a force that the solver takes for one [N]."""
 
 
+@dataclass(frozen=True)
+class _Each:
+    """The labels of rows that are repeated for each "joint", "contact" or "jet"."""
+
+    of: str
+    axes: tuple[str, ...]
+
+    def __call__(self, parameters: Parameters) -> tuple[str, ...]:
+        return row_labels(parameters.robot, self.of, self.axes)
+
+
 def _each(of: str, *axes: str) -> Labels:
-    """Return the labels of rows that are repeated for each "joint", "contact" or "jet"."""
-    return lambda parameters: row_labels(parameters.robot, of, axes or ("",))
+    return _Each(of, axes or ("",))
+
+
+def _faces(parameters: Parameters) -> tuple[str, ...]:
+    return row_labels(parameters.robot, "contact", FACES[parameters.scenario.friction_cone])
+
+
+def _complementarity_max(parameters: Parameters) -> float:
+    return parameters.complementarity_max
+
+
+def _sliding_max(parameters: Parameters) -> float:
+    return parameters.sliding_max
+
+
+def _sliding_min(parameters: Parameters) -> float:
+    return -parameters.sliding_max
+
+
+@dataclass(frozen=True)
+class _WeightOf:
+    """The scenario's weight of a name, as a value: terms that hold it compare and can be pickled."""
+
+    name: str
+
+    def __call__(self, parameters: Parameters) -> float | Array:
+        value = getattr(parameters.scenario.weights, self.name)
+        if isinstance(value, int | float):
+            return float(value)
+        by_joint = np.zeros(len(parameters.robot.joint_names))
+        for group, number in value.items():
+            by_joint[parameters.robot.group_indices(group)] = number
+        return by_joint
+
+
+def weight_of(name: str) -> Callable[[Parameters], float | Array]:
+    """Return the scenario's weight of a name; one by joint group becomes one for each joint."""
+    return _WeightOf(name)
 
 
 def _hovers_first(parameters: Parameters) -> bool:
@@ -106,11 +153,11 @@ FRICTION_CONE = Constraint(
     unit="N",
     holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
     scale=FORCE,
-    labels=lambda parameters: row_labels(parameters.robot, "contact", FACES[parameters.scenario.friction_cone]),
+    labels=_faces,
 )
 COMPLEMENTARITY = Constraint(
     value=constraints.complementarity,
-    within=at_most(lambda parameters: parameters.complementarity_max),
+    within=at_most(_complementarity_max),
     unit="N m",
     holds=Where.LATER_KNOTS,
     labels=_each("contact"),
@@ -192,7 +239,7 @@ THRUST_DYNAMICS = Constraint(
 )
 SLIDING = Constraint(
     value=constraints.sliding,
-    within=between(lambda parameters: -parameters.sliding_max, lambda parameters: parameters.sliding_max),
+    within=between(_sliding_min, _sliding_max),
     unit="N m",
     holds=Where.EVERY_INTERVAL,
     labels=_each("contact", "x", "y"),
@@ -210,7 +257,7 @@ STANDING_HEIGHT = Constraint(
 
 COMPLEMENTARITY_BEFORE = Constraint(
     value=constraints.complementarity_before,
-    within=at_most(lambda parameters: parameters.complementarity_max),
+    within=at_most(_complementarity_max),
     unit="N m",
     holds=Where.EVERY_INTERVAL,
     labels=_each("contact"),
@@ -313,21 +360,6 @@ CONSTRAINTS = (
 )
 
 # -------------------------------------------------------------------- costs
-
-
-def weight_of(name: str) -> Callable[[Parameters], float | Array]:
-    """Return the scenario's weight of a name; one by joint group becomes one for each joint."""
-
-    def weight(parameters: Parameters) -> float | Array:
-        value = getattr(parameters.scenario.weights, name)
-        if isinstance(value, int | float):
-            return float(value)
-        by_joint = np.zeros(len(parameters.robot.joint_names))
-        for group, number in value.items():
-            by_joint[parameters.robot.group_indices(group)] = number
-        return by_joint
-
-    return weight
 
 
 def running(

@@ -19,10 +19,11 @@ from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import QUANTITIES, Trajectory, row_units
 from multimodal_to.trajectory.resampling import regrid
 from multimodal_to.trajectory.sameness import refuse_other_robot
+from multimodal_to.values import Value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RowSet:
+class RowSet(Value):
     """The rows of one term on the whole horizon, as far as they are in g."""
 
     index: NDArray[np.int64]  # into g
@@ -54,10 +55,11 @@ class BoundSet(RowSet):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Problem:
+class Problem(Value):
     """A scenario for a robot as an `Opti` problem, with the names of its variables, rows and costs.
 
-    x stacks the knots' variables, knot by knot, and Δt, all divided by their scales.
+    x stacks the knots' variables, knot by knot, and Δt, all divided by their scales. Problems of the same robot,
+    scenario and formulation are equal; another process, or a copy, builds it again from these.
     """
 
     robot: Robot
@@ -79,6 +81,15 @@ class Problem:
     parameters: Parameters = field(repr=False)  # what the terms have read
     initial: State | None = field(repr=False, default=None)  # that a motion with a given start starts in
     scale: Array = field(repr=False)  # of x
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Problem) and self._asked() == other._asked()
+
+    def __hash__(self) -> int:
+        return hash(self._asked())
+
+    def _asked(self) -> tuple[Robot, Scenario, Formulation]:
+        return self.robot, self.scenario, self.formulation
 
     def start_from(self, trajectory: Trajectory) -> Array:
         """Return x for a motion of the same robot: at equal shares of its duration, moved within the bounds.

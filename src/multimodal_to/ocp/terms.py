@@ -17,6 +17,7 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import SX, Array
+from multimodal_to.arguments import check_fields
 from multimodal_to.errors import FormulationError, MultimodalError, listed, said, shown
 from multimodal_to.models.joint_units import either, joint_units
 from multimodal_to.ocp.integration import Interval
@@ -74,6 +75,9 @@ class Within:
 
     lower: Limit
     upper: Limit
+
+    def __post_init__(self) -> None:
+        check_fields(self, FormulationError, "the set's ")
 
     def limits(self, parameters: Parameters) -> tuple[float, float]:
         """Return the two numbers."""
@@ -271,6 +275,15 @@ def _complete(term: Constraint | Cost, function: Any, place: str) -> None:
     Raises:
         FormulationError: something is not what it should be.
     """
+    check_fields(
+        term,
+        FormulationError,
+        f"the term {shown(term.name)}: ",
+        ("value", "residual", "within", "holds", "charged"),
+    )
+    for key in ("unit", "labels", place):
+        if isinstance(value := getattr(term, key, None), list):
+            object.__setattr__(term, key, tuple(value))
     name = term.name or getattr(function, "__name__", "")
     if not callable(function):
         raise _wrong(term.name, f"what it asks for is {shown(function)}", "a function")

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import check_fields
 from multimodal_to.errors import FormulationError, ScenarioError, unknown
 from multimodal_to.models.joint_units import either
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import QUANTITIES
+from multimodal_to.values import Value
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,7 @@ class Variable:
     scale: float = 1.0  # [unit of the quantity]
 
     def __post_init__(self) -> None:
+        check_fields(self, FormulationError)
         if self.name not in QUANTITIES:
             raise FormulationError(unknown("variable", self.name, QUANTITIES))
         if not 0 < self.scale < math.inf:
@@ -59,8 +62,8 @@ INTERVAL_SCALE = 0.1
 """What the solver sees as one of Δt [s]."""
 
 
-@dataclass(frozen=True)
-class Layout:
+@dataclass(frozen=True, eq=False)
+class Layout(Value):
     """Where each decision variable stands among those of one knot."""
 
     rows: dict[str, slice]

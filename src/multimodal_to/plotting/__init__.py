@@ -1,7 +1,10 @@
 """Figures of one or several `Trajectory`s, which the caller shows or saves: nothing is shown here."""
 
+# isort: off
+from multimodal_to.plotting import backend  # noqa: F401  # before all that imports matplotlib
+
+# isort: on
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Protocol
 
 from matplotlib.figure import Figure
@@ -15,6 +18,7 @@ from multimodal_to.plotting.margins import plot_margins
 from multimodal_to.plotting.motion import plot_com, plot_momentum
 from multimodal_to.plotting.style import SUFFIXES, save
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.values import FrozenMapping
 
 __all__ = [
     "FIGURES",
@@ -35,7 +39,7 @@ class _Plot(Protocol):
     def __call__(self, robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure: ...
 
 
-FIGURES: Mapping[str, _Plot] = MappingProxyType(
+FIGURES: Mapping[str, _Plot] = FrozenMapping(
     {
         "forces": plot_forces,
         "com": plot_com,

@@ -18,6 +18,7 @@ from multimodal_to.plotting.style import (
     draw_flight,
     draw_limits,
     draw_lines,
+    draw_nothing,
     finish,
     new_figure,
     runs_of,
@@ -38,7 +39,7 @@ def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
         InputError: the trajectories are for different robots, or too many.
     """
     runs = runs_of(robot, trajectories, labels)
-    rows = -(-len(robot.joint_names) // _COLUMNS)
+    rows = _rows(robot.joint_names)
     figure = new_figure(runs, "joints", (_COLUMNS * _CELL[0], (rows + 2.1) * _CELL[1]))
     upper, lower = np.asarray(figure.subfigures(2, 1, height_ratios=[rows, 2.1]))
     limits = robot.joint_limits
@@ -66,7 +67,7 @@ def plot_torques(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] 
         InputError: the trajectories are for different robots, or too many.
     """
     runs = runs_of(robot, trajectories, labels)
-    rows = -(-len(robot.joint_names) // _COLUMNS)
+    rows = _rows(robot.joint_names)
     figure = new_figure(runs, "joint torques", (_COLUMNS * _CELL[0], (rows + 0.2) * _CELL[1]))
     effort = robot.joint_limits.effort
     values = [blank(joint_torques(run.robot, run.trajectory), run.trajectory) for run in runs]
@@ -100,8 +101,10 @@ def _cells(
         whole_range: show the limits even where the motion stays far from them.
     """
     names, units = runs[0].robot.joint_names, joint_units(runs[0].robot, unit)
-    rows = -(-len(names) // _COLUMNS)
-    grid = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False)
+    if not names:
+        draw_nothing(figure, "the robot has no joints")
+        return
+    grid = figure.subplots(_rows(names), _COLUMNS, sharex=True, squeeze=False)
     for index, axes in enumerate(grid.ravel()):
         if index >= len(names):
             axes.set_axis_off()
@@ -116,6 +119,11 @@ def _cells(
         finish([axes], 0.0 if whole_range else 1.0)
         _tick(axes, bottom=index + _COLUMNS >= len(names))
     figure.supylabel(f"{title} [{_several(units)}]", fontsize="medium")
+
+
+def _rows(names: Sequence[str]) -> int:
+    """Return the rows of panels for joints, and one where there are none."""
+    return max(-(-len(names) // _COLUMNS), 1)
 
 
 def _cell_title(name: str, ends: Sequence[float], whole_range: bool, unit: str) -> str:
@@ -148,6 +156,8 @@ def _other_unit(units: Sequence[str], index: int) -> str:
 
 def _speeds(figure: SubFigure, robot: Robot, runs: Sequence[Run]) -> None:
     groups, units = _disjoint_groups(robot), joint_units(robot, "rad/s")
+    if not groups:
+        return
     panels = figure.subplots(1, len(groups), sharex=True, squeeze=False)[0]
     for axes, (name, members) in zip(panels, groups.items(), strict=True):
         rows = [robot.joint_names.index(member) for member in members]

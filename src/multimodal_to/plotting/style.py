@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
 from multimodal_to.adam.spatial import Array
@@ -20,6 +20,7 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory, rules
 from multimodal_to.trajectory.derived import flight_phases, without_acceleration
 from multimodal_to.trajectory.sameness import refuse_other_robot
+from multimodal_to.values import Value
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """What a figure can be saved as."""
@@ -35,7 +36,7 @@ _DPI = 150
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Run:
+class Run(Value):
     """One trajectory in a figure: with the robot that has its jets, and the line style and name that tell it apart."""
 
     robot: Robot
@@ -86,6 +87,11 @@ def new_figure(runs: Sequence[Run], what: str, size: tuple[float, float]) -> Fig
         columns = int(min(len(runs), max(1, size[0] * _LETTERS_PER_INCH // (longest + _SAMPLE))))
         figure.legend(handles, [run.label for run in runs], loc="outside lower center", ncols=columns, frameon=False)
     return figure
+
+
+def draw_nothing(figure: Figure | SubFigure, why: str) -> None:
+    """Say in the middle of a figure why it is empty."""
+    figure.text(0.5, 0.5, why, ha="center", va="center")
 
 
 def draw_row(axes: Axes, run: Run, values: Array, of: str, **look: Any) -> None:

@@ -7,7 +7,6 @@ import json
 import os
 import shutil
 import subprocess
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
@@ -18,7 +17,9 @@ from typing import Any
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
+from multimodal_to import children
 from multimodal_to.errors import OutputError, said
+from multimodal_to.files.writing import scratch
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 """Programs that are looked for, in this order, where the environment's CHROME_PATH names none."""
@@ -123,20 +124,18 @@ def open_browser(size: tuple[int, int]) -> Iterator[Page]:
             "pictures and films need Chromium or Chrome, and none was found: install it (`apt-get install chromium`), "
             "or name its program in the environment variable CHROME_PATH"
         )
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+    with scratch() as profile:
         as_root = os.name == "posix" and os.geteuid() == 0  # for whom Chromium has no sandbox
         sandbox = ("--no-sandbox",) if as_root else ()
         window = f"--window-size={size[0]},{size[1]}"
         try:
-            process = subprocess.Popen(
-                [program, *_OPTIONS, *sandbox, window, f"--user-data-dir={profile}", "about:blank"],
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
+            process = children.start(
+                [program, *_OPTIONS, *sandbox, window, f"--user-data-dir={profile}", "about:blank"]
             )
         except OSError as error:
             raise OutputError(f"'{program}' does not start: {error.strerror or error}") from error
         try:
-            address = _address(process, Path(profile))
+            address = _address(process, profile)
             with connect(address, max_size=None, open_timeout=_PATIENCE, proxy=None) as socket:
                 page = Page(socket)
                 page.call(
@@ -150,12 +149,7 @@ def open_browser(size: tuple[int, int]) -> Iterator[Page]:
         except (WebSocketException, TimeoutError, ConnectionError) as error:
             raise OutputError(f"the browser '{program}' stopped answering: {said(error)}") from error
         finally:
-            process.terminate()
-            try:
-                process.wait(timeout=10.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            children.end(process)
 
 
 def _address(process: subprocess.Popen[bytes], profile: Path) -> str:

@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 import io
+import os
+import subprocess
+import sys
 from contextlib import redirect_stdout
+from pathlib import Path
 
+from multimodal_to import children
+from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.motion import draw_motion
 from multimodal_to.replay.scene import meshcat
@@ -24,10 +30,33 @@ def show(
         meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
 
     Raises:
+        OutputError: meshcat's server does not start.
         InputError: the ghost is not one of the same robot.
     """
     look = appearance(robot.urdf, meshes=meshes)
+    server, address = _server()
     with redirect_stdout(io.StringIO()):  # meshcat prints the address
-        visualizer = meshcat.Visualizer()
+        visualizer = meshcat.Visualizer(zmq_url=address)
+    visualizer.window.server_proc = server
     draw_motion(visualizer, robot, trajectory, look, ghost=ghost, live=True)
     return visualizer
+
+
+def _server() -> tuple[subprocess.Popen[bytes], str]:
+    """Start meshcat's server, which ends with this process, and return it and the address that it listens at.
+
+    Raises:
+        OutputError: it does not start.
+    """
+    beside = str(Path(meshcat.__file__).parents[1])  # meshcat may have been found in any way
+    process = children.start(
+        [sys.executable, "-u", "-m", "meshcat.servers.zmqserver"],
+        reads=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (beside, os.environ.get("PYTHONPATH"))))},
+    )
+    assert process.stdout is not None
+    for line in process.stdout:
+        if line.startswith(b"zmq_url="):
+            return process, line.decode().strip().removeprefix("zmq_url=")
+    children.end(process)
+    raise OutputError("meshcat's server does not start")

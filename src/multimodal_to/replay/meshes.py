@@ -17,6 +17,7 @@ import trimesh
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import MultimodalError, said
 from multimodal_to.replay.collada import mended
+from multimodal_to.values import Value
 
 ROOT_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH")
 """Environment variables that list folders in which packages of meshes lie."""
@@ -39,7 +40,7 @@ class _UnusableError(MultimodalError):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Part:
+class Part(Value):
     """Triangles of one colour, in metres in the frame of the visual."""
 
     vertices: Array  # (n, 3) [m]

@@ -11,7 +11,7 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
-from multimodal_to.models.terrain import FlatGround, Surface, heights_below
+from multimodal_to.models.terrain import FlatGround, Surface, heights_below, uphill
 from multimodal_to.replay.bodies import draw_links, draw_visuals, drawn, faded, link_paths, link_poses
 from multimodal_to.replay.effects import draw_com, draw_com_trace, draw_contact_forces, draw_flames
 from multimodal_to.replay.ghost import draw_ghost, in_step
@@ -106,7 +106,8 @@ def draw_still(
     """Draw the robot at several times [s] in one scene, with its flames and contact forces, and a label under each.
 
     Where it travels far enough from one to the next, ghosts stand where they were, the earlier the fainter; else they
-    stand side by side, from left to right, which ground that is not flat forbids.
+    stand side by side, from left to right; on a slope or on stairs along their contour lines. Ground that changes every
+    way forbids that.
 
     Args:
         visualizer: meshcat's, whose window may be a `Recorder`.
@@ -126,7 +127,7 @@ def draw_still(
         raise InputError(f"the times of the snapshots are {instants.tolist()}; expected times that increase [s]")
     ghosts = _frozen(trajectory, instants)
     surface = surface_of(trajectory)
-    direction, offsets, apart = _layout(robot, ghosts, look.visuals, level=isinstance(surface, FlatGround))
+    direction, offsets, apart = _layout(robot, ghosts, look.visuals, surface)
     boxes = [
         np.array(_extent(robot, ghost, look.visuals, np.zeros((2, 3)))) + offset
         for ghost, offset in zip(ghosts, offsets, strict=True)
@@ -186,7 +187,7 @@ def _frozen(trajectory: Trajectory, instants: Array) -> list[Trajectory]:
 
 
 def _layout(
-    robot: Robot, ghosts: list[Trajectory], visuals: tuple[Visual, ...], *, level: bool
+    robot: Robot, ghosts: list[Trajectory], visuals: tuple[Visual, ...], surface: Surface
 ) -> tuple[Array, Array, bool]:
     """Return the camera's direction, how far each ghost is moved aside (ghosts, 3), and whether they were moved.
 
@@ -194,15 +195,17 @@ def _layout(
         robot: that moves.
         ghosts: the robot at each time, from `_frozen`.
         visuals: of the robot.
-        level: the ground is flat, so that ghosts may be moved aside.
+        surface: ghosts may be moved aside where it is flat, or across the way that it rises along.
     """
     low, high = _extent(robot, ghosts[0], visuals, np.zeros((2, 3)))
     width = float(np.linalg.norm((high - low)[:2])) / math.sqrt(2.0)
     places = np.array([ghost.com_position[:, 0] * [1.0, 1.0, 0.0] for ghost in ghosts])
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    if not level and (len(ghosts) < 2 or not steps.any()):
+    flat, up = isinstance(surface, FlatGround), uphill(surface)
+    movable = flat or up is not None
+    if not movable and (len(ghosts) < 2 or not steps.any()):
         return _HALF_LEFT, np.zeros((len(ghosts), 3)), True
-    if len(ghosts) > 1 and (steps.min() > 0.5 * width or not level):
+    if len(ghosts) > 1 and (steps.min() > 0.5 * width or not movable):
         farthest = places[np.linalg.norm(places - places[0], axis=1).argmax()] - places[0]
         travel = farthest / np.linalg.norm(farthest)
         side = np.array([travel[1], -travel[0], _FROM_THE_SIDE])  # from there the motion goes from left to right
@@ -210,6 +213,11 @@ def _layout(
     direction = np.array([*_HALF_LEFT[:2], _FROM_THE_SIDE])
     right = np.array([-direction[1], direction[0], 0.0]) / np.linalg.norm(direction[:2])
     shares = np.arange(len(ghosts)) - (len(ghosts) - 1) / 2.0
+    if up is not None:  # seen from below, and moved along the contour lines alone
+        direction = np.array([-up[0], -up[1], _FROM_THE_SIDE])
+        right = np.array([up[1], -up[0], 0.0])
+        along = (places - places.mean(axis=0)) @ right
+        return direction, (shares * (1.0 + _GAP) * width - along)[:, None] * right, True
     return direction, shares[:, None] * (1.0 + _GAP) * width * right - (places - places.mean(axis=0)), True
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -13,9 +12,9 @@ from PIL import Image
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError, OutputError
-from multimodal_to.files.writing import whole
+from multimodal_to.files.writing import scratch, whole
 from multimodal_to.models.robot import Robot
-from multimodal_to.models.terrain import FlatGround
+from multimodal_to.models.terrain import FlatGround, uphill
 from multimodal_to.replay.browser import open_browser
 from multimodal_to.replay.motion import surface_of
 from multimodal_to.replay.page import write_html, write_still_html
@@ -149,8 +148,8 @@ def write_snapshots(
     """
     instants = snapshot_times(robot, trajectory) if times is None else np.array(list(times), dtype=float)
     width, height = size or (max(SNAPSHOT_SIZE[0] * instants.size, SNAPSHOT_SIZE[1]), SNAPSHOT_SIZE[1])
-    with tempfile.TemporaryDirectory() as folder, whole(path) as draft:
-        page = Path(folder) / "still.html"
+    with scratch() as folder, whole(path) as draft:
+        page = folder / "still.html"
         write_still_html(robot, trajectory, instants, page, aspect=width / height, meshes=meshes)
         with open_browser((width, height)) as browser:
             browser.open(page, "#bare")
@@ -162,7 +161,8 @@ def write_snapshots(
 def snapshot_times(robot: Robot, trajectory: Trajectory) -> Array:
     """Return times [s] that tell a motion: start and end, and those where flight begins or ends, or even ones.
 
-    They are five; on ground that is not flat, where ghosts stand where they were, only those that leave room between.
+    They are five; on ground that changes every way, where ghosts stand where they were, only those that leave room
+    between.
 
     Args:
         robot: whose weight tells flight.
@@ -173,7 +173,8 @@ def snapshot_times(robot: Robot, trajectory: Trajectory) -> Array:
     times = np.linspace(start, end, 5)
     if len(edges) == 1:
         times = np.array([start, (start + edges[0]) / 2, edges[0], (edges[0] + end) / 2, end])
-    return times if isinstance(surface_of(trajectory), FlatGround) else _apart(trajectory, times)
+    surface = surface_of(trajectory)
+    return times if isinstance(surface, FlatGround) or uphill(surface) is not None else _apart(trajectory, times)
 
 
 def _apart(trajectory: Trajectory, times: Array) -> Array:
@@ -206,8 +207,8 @@ def _film(
         ghost: another motion of the same robot, drawn faint in the same scene; it begins when this one does.
         meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        page = write_html(robot, trajectory, Path(folder) / "film.html", ghost=ghost, meshes=meshes)
+    with scratch() as folder:
+        page = write_html(robot, trajectory, folder / "film.html", ghost=ghost, meshes=meshes)
         with open_browser(size) as browser:
             browser.open(page, "#film&t=0")
             for instant in times.tolist():

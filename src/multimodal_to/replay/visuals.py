@@ -15,6 +15,7 @@ from multimodal_to.adam.urdf import parse_urdf
 from multimodal_to.errors import MultimodalError
 from multimodal_to.replay.dress import Dress, read_dress
 from multimodal_to.replay.meshes import MeshWarning, Part, load_parts, simplified
+from multimodal_to.values import Value
 
 FACES = 110_000
 """Triangles of all meshes of a robot together; those of heavier robots are thinned out to about as many."""
@@ -26,7 +27,7 @@ _NAMED = 3  # so many meshes that cannot be drawn are named in the warning
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Visual:
+class Visual(Value):
     """One shape of a link: a primitive of the URDF, or triangles."""
 
     link: str

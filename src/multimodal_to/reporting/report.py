@@ -24,7 +24,7 @@ from multimodal_to.replay import player
 from multimodal_to.scenarios.files import to_toml
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory
-from multimodal_to.trajectory.derived import largest_torques
+from multimodal_to.trajectory.derived import LargestTorque, largest_torques
 
 PACKAGES = ("multimodal-to", "casadi", "numpy")
 """Whose versions the report names as those that drew it."""
@@ -82,17 +82,21 @@ def _summary(report: Audit) -> str:
     return f'<span class="fails">{len(failed)} of {count} properties fail: {html.escape(", ".join(failed))}.</span>'
 
 
+def _torque(largest: LargestTorque) -> str:
+    share = f", {100 * largest.over_effort:.0f} % of its effort limit" if np.isfinite(largest.effort) else ""
+    return f"{largest.torque:.1f} {largest.unit} of {largest.joint} at {largest.when:.2f} s{share}"
+
+
 def _facts(robot: Robot, trajectory: Trajectory, report: Audit) -> dict[str, str]:
     versions = [f"{name} {metadata.version(name)}" for name in PACKAGES]
-    torque = largest_torques(robot, trajectory)[0]
-    share = f", {100 * torque.over_effort:.0f} % of its effort limit" if np.isfinite(torque.effort) else ""
+    torques = largest_torques(robot, trajectory)
     status, took = (_solve_facts(trajectory.solve_record())[name] for name in ("status", "time in the solver"))
     return {
         "scenario": trajectory.scenario,
         "robot": f"{robot.name}: {len(robot.joint_names)} joints, {robot.mass:.2f} kg, "
         f"{len(robot.contacts)} contact points, {len(robot.jets)} jets",
         "time": f"{report.duration:.2f} s in {trajectory.knots} intervals; longest flight {report.airborne:.2f} s",
-        "largest joint torque": f"{torque.torque:.1f} {torque.unit} of {torque.joint} at {torque.when:.2f} s{share}",
+        "largest joint torque": _torque(torques[0]) if torques else "the robot has no joints",
         "thrust at the end": f"{100 * report.final_thrust_over_weight:.2f} % of the weight, vertically",
         "solver": ", ".join(filter(None, (status, took))) or "not known",
         "report made with": ", ".join([*versions, f"Python {platform.python_version()}"]),

@@ -21,10 +21,11 @@ from multimodal_to.solving.solution import Progress
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import footsteps
 from multimodal_to.trajectory.importing import import_arrays
+from multimodal_to.values import Value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Run:
+class Run(Value):
     """A trajectory with its audit and, where it was solved here, how the solve went."""
 
     name: str  # of the scenario

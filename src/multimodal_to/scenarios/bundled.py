@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Any
 
+from multimodal_to.arguments import checked
 from multimodal_to.errors import ScenarioError, unknown
 from multimodal_to.models.terrain import Stairs
 from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
+from multimodal_to.values import FrozenMapping
 
 
 def take_off() -> Scenario:
@@ -183,7 +184,7 @@ def step_up() -> Scenario:
     )
 
 
-SCENARIOS: Mapping[str, Callable[[], Scenario]] = MappingProxyType(
+SCENARIOS: Mapping[str, Callable[[], Scenario]] = FrozenMapping(
     {
         "take-off": take_off,
         "take-off-and-landing": take_off_and_landing,
@@ -204,6 +205,7 @@ _NOT_IN_THE_PAPER: dict[str, Any] = {
 }
 
 
+@checked
 def paper(name: str) -> Scenario:
     """Return a bundled scenario as the paper's own formulation is solved with it, without margins.
 
@@ -234,6 +236,7 @@ def paper(name: str) -> Scenario:
     return plain
 
 
+@checked
 def find(name: str) -> Scenario:
     """Return a bundled scenario by name.
 

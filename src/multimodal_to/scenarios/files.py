@@ -13,6 +13,7 @@ from typing import Any
 
 import tomli_w
 
+from multimodal_to.arguments import checked
 from multimodal_to.errors import MultimodalError, ScenarioError, shortened, shown
 from multimodal_to.files.numbers import number
 from multimodal_to.files.reading import parse_toml, read_toml
@@ -22,6 +23,7 @@ from multimodal_to.scenarios.data import from_dict, to_dict
 from multimodal_to.scenarios.scenario import Scenario
 
 
+@checked
 def load(path: str | os.PathLike[str]) -> Scenario:
     """Return the scenario of a TOML file; without a `name`, the file's own is taken.
 
@@ -44,11 +46,13 @@ def _scenario(table: dict[str, Any], name: str) -> Scenario:
     return from_dict(table, find(parent) if parent is not None else None)
 
 
+@checked
 def to_toml(scenario: Scenario) -> str:
     """Return a scenario, complete, as the text of a file that `load` reads."""
     return tomli_w.dumps(to_dict(scenario))
 
 
+@checked
 def save(scenario: Scenario, path: str | os.PathLike[str]) -> Path:
     """Write a scenario, complete, as a file that `load` reads; it appears whole or not at all.
 
@@ -59,6 +63,7 @@ def save(scenario: Scenario, path: str | os.PathLike[str]) -> Path:
     return write_text(path, to_toml(scenario))
 
 
+@checked
 def change(scenario: Scenario, settings: Iterable[str]) -> Scenario:
     """Return a scenario with values changed by texts such as `final_com_height=0.8` or `weights.thrust=3`.
 

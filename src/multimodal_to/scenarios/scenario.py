@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from enum import Enum
-from types import MappingProxyType
 
+from multimodal_to.arguments import check_fields
 from multimodal_to.errors import ScenarioError, shown
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Surface
+from multimodal_to.values import FrozenMapping
 
 Vector3 = tuple[float, float, float]
 
@@ -103,12 +104,13 @@ class Weights:
     """Weight of ḣω at the last knot [1/(N m)²]."""
 
     def __post_init__(self) -> None:
+        check_fields(self, ScenarioError, "weight ")
         for entry in fields(self):
             value = getattr(self, entry.name)
             for number in value.values() if isinstance(value, Mapping) else (value,):
                 if not (math.isfinite(number) and number >= 0):
                     raise ScenarioError(f"weight '{entry.name}' is {number}; expected a number of at least zero")
-        object.__setattr__(self, "joint_velocities", MappingProxyType(dict(self.joint_velocities)))
+        object.__setattr__(self, "joint_velocities", FrozenMapping(self.joint_velocities))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,6 +132,7 @@ class Margins:
     """Least distance between links of the robot that are not neighbours [L]."""
 
     def __post_init__(self) -> None:
+        check_fields(self, ScenarioError, "margin ")
         for entry in fields(self):
             number = getattr(self, entry.name)
             if not (math.isfinite(number) and number >= 0):
@@ -195,7 +198,8 @@ class Scenario:
     """How many steps the feet take in the start guess, in turns [1]; with 0 they glide along with the CoM."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "allowances", MappingProxyType(dict(self.allowances)))
+        check_fields(self, ScenarioError)
+        object.__setattr__(self, "allowances", FrozenMapping(self.allowances))
         self._check_name()
         self._check_numbers()
         self._check_positions()
@@ -230,6 +234,8 @@ class Scenario:
             value = getattr(self, label)
             if value is not None and not 0 < value < math.inf:
                 raise ScenarioError(f"{label} is {value}; expected a positive number")
+        if self.mid_height_min is not None and not math.isfinite(self.mid_height_min):
+            raise ScenarioError(f"mid_height_min is {self.mid_height_min}; expected a finite number [m]")
         if not 0 <= self.guess_steps <= self.knots:
             raise ScenarioError(f"guess_steps is {shown(self.guess_steps)}; expected 0 to the number of knots")
 
@@ -238,6 +244,7 @@ class Scenario:
             value = getattr(self, label)
             if len(value) != 3 or not all(math.isfinite(number) for number in value):
                 raise ScenarioError(f"{label} is {value}; expected three finite numbers [m]")
+            object.__setattr__(self, label, tuple(map(float, value)))
         for label in ("initial_com", "final_com"):
             for axis, number, bound in zip("xyz", getattr(self, label), self.com_range, strict=True):
                 if abs(number) > bound:

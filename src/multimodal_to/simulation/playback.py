@@ -26,6 +26,7 @@ from multimodal_to.simulation.stabiliser import Correction, Turbines, correct, r
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.sameness import refuse_other_robot
+from multimodal_to.values import Value
 
 HOLD = 1.0  # how long the end of the plan is held [s]
 PERIOD = 4  # steps of the simulation between two decisions of the stabiliser [1]
@@ -39,7 +40,7 @@ REACH = 2.0  # how far ground that is no plane goes beyond the way of the CoM [m
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Playback:
+class Playback(Value):
     """What a simulation did: a row for each of its steps, in world axes. A robot that has fallen stays as it is."""
 
     robot: Robot

@@ -81,7 +81,7 @@ def tracking(playback: Playback) -> Tracking:
             for wanted, turn in zip(reference.rotation, _rotations(playback.qpos), strict=True)
         ]
     )
-    joints = np.abs(playback.qpos[:, 7:] - reference.joints)[during].max(axis=0)
+    joints = np.abs(playback.qpos[:, 7:] - reference.joints)[during].max(axis=0, initial=0.0)
     turn, turning = _worst_joint(robot, joints, sliding=False)
     slide, sliding = _worst_joint(robot, joints, sliding=True)
     thrust = np.abs(playback.thrust - reference.thrust)[during]

@@ -97,7 +97,8 @@ def correct(
     robot = simulation.robot
     com, points = data.subtree_com[1], data.geom_xpos[simulation.points]
     loads = np.maximum(plan.contact_forces[step][:, 2], 0.0)
-    same_foot = np.array([[one.foot == other.foot for other in robot.contacts] for one in robot.contacts])
+    feet = np.array([contact.foot for contact in robot.contacts], dtype=np.str_)
+    same_foot = feet[:, None] == feet
     touches = same_foot @ np.isin(simulation.points, data.contact.geom)
     standing = np.flatnonzero((same_foot @ loads > flight_force(robot)) & touches)  # loaded by the plan
     stands, load = bool(standing.size), float(loads[standing].sum())

@@ -6,6 +6,8 @@ import signal
 import threading
 from types import FrameType
 
+from multimodal_to import ending
+
 
 class Interrupts:
     """While entered, the first Ctrl-C is noted in `asked` instead of raising; the next one raises again.
@@ -20,14 +22,15 @@ class Interrupts:
 
     def __enter__(self) -> Interrupts:
         main = threading.current_thread() is threading.main_thread()
-        self._entered = main and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        self._before = signal.getsignal(signal.SIGINT) if main else None
+        self._entered = self._before in (signal.default_int_handler, ending.on_interrupt)
         if self._entered:
             signal.signal(signal.SIGINT, self._note)
         return self
 
     def __exit__(self, *_: object) -> None:
         if self._entered:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.signal(signal.SIGINT, self._before)
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         self.asked = True

@@ -14,6 +14,7 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import check_fields
 from multimodal_to.errors import InputError, SolverError
 from multimodal_to.ocp.problem import Problem
 from multimodal_to.solving import linear_solvers, machine, stages
@@ -85,6 +86,7 @@ class Ipopt:
     hsl_library: str = ""  # file of the HSL library; empty: looked for
 
     def __post_init__(self) -> None:
+        check_fields(self)
         linear_solvers.check(self.linear_solver, self.hsl_library)
         for name in self.__dataclass_fields__:
             value = getattr(self, name)

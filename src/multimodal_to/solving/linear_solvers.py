@@ -13,7 +13,7 @@ from typing import Any
 
 import casadi as cs
 
-from multimodal_to import native
+from multimodal_to import children, native
 from multimodal_to.errors import InputError, SolverError, said, unknown
 
 AUTO = "auto"
@@ -169,14 +169,7 @@ def _command(name: str, library: str) -> list[str]:
 def _trial(name: str, library: str) -> str:
     """Solve a tiny programme in a child process; return nothing where it works, otherwise what went wrong."""
     try:
-        ended = subprocess.run(
-            _command(name, library),
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            timeout=_PATIENCE,
-            check=False,
-        ).returncode
+        ended = children.run(_command(name, library), timeout=_PATIENCE)
     except subprocess.TimeoutExpired:
         return f"a trial of it did not end within {_PATIENCE:g} s"
     except (OSError, ValueError) as error:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.native.stage_solver import KktStructure
 from multimodal_to.ocp.problem import Problem
@@ -21,6 +22,7 @@ from multimodal_to.solving.motion import motion
 from multimodal_to.solving.status import Status
 from multimodal_to.solving.violations import Violation, unmet_terms
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.values import Value
 
 GIVES_WAY = 1e-4
 """What a row has to give way by to be named, in solver units: 0.1 mm, 5e-3 N."""
@@ -29,7 +31,7 @@ _NEARNESS = 1e-5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Relaxation:
+class Relaxation(Value):
     """What has to give way, as far as a local method can say."""
 
     status: Status  # of the relaxed problem
@@ -39,6 +41,7 @@ class Relaxation:
     solve_time: float  # [s]
 
 
+@checked
 def relax(
     problem: Problem, start: Trajectory | None = None, solver: Ipopt | None = None, *, terms: Sequence[str] = ()
 ) -> Relaxation:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import SolverError
 from multimodal_to.native import instruction_set
 from multimodal_to.ocp.problem import Problem
@@ -22,6 +23,7 @@ from multimodal_to.solving.solver import FEASIBLE, Ending, Solver, StartPoint
 from multimodal_to.solving.status import Status
 from multimodal_to.solving.violations import Violation, unmet
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.values import Value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +39,7 @@ class Iterate:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Solution:
+class Solution(Value):
     """What a solve ended with: its verdict by name, and the trajectory.
 
     Without an answer the trajectory is the best iterate: of those that are feasible within `FEASIBLE` the one with
@@ -69,6 +71,7 @@ Progress = Callable[[Iterate], bool]
 """Called at every iteration; a true answer stops the solve."""
 
 
+@checked
 def solve(
     problem: Problem,
     solver: Solver | None = None,

@@ -10,13 +10,14 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.ocp.problem import Problem
 from multimodal_to.solving.stages import KeptStages
 from multimodal_to.solving.status import Status
+from multimodal_to.values import Value
 
 FEASIBLE = 1e-5
 """Greatest violation of a feasible iterate, in solver units: 1e-5 m, rad, N m and so on, and 5e-4 N."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class StartPoint:
+class StartPoint(Value):
     """Where a solver starts."""
 
     x: Array  # all variables, in solver units, within their bounds
@@ -58,7 +59,7 @@ class Watch(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Ending:
+class Ending(Value):
     """What a solver ends with."""
 
     x: Array  # all variables, in solver units, answer or not

@@ -33,6 +33,7 @@ _ADVICE = {
     Status.ITERATION_LIMIT: "allow more iterations, or check that the violations still fall",
     Status.TIME_LIMIT: "allow more time, or check that the violations still fall",
     Status.STOPPED: "stopped on request; what was found by then is no answer, but a solve can go on from it",
-    Status.INFEASIBLE: "the rows with the largest violation contradict each other; relax what they ask for",
+    Status.INFEASIBLE: "no motion near this one meets all rows, and the largest violation is seldom the cause; "
+    "`solve --explain`, in Python `relax`, finds the rows that have to give way",
     Status.FAILED: "the solver gave up; look at the largest violations and at the scenario's numbers",
 }

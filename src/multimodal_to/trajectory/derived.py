@@ -110,12 +110,15 @@ def _stacked(side_by_side: cs.DM) -> Array:
 
 def contact_points(robot: Robot, trajectory: Trajectory) -> Array:
     """Return the contact points by forward kinematics [m], (contacts, knots + 1, 3)."""
-    return np.array([frame_poses(robot, trajectory, name)[:, :3, 3] for name in trajectory.contact_names])
+    points = [frame_poses(robot, trajectory, name)[:, :3, 3] for name in trajectory.contact_names]
+    return np.array(points).reshape(-1, trajectory.time.size, 3)
 
 
 def surface_frames(surface: Surface, points: Array) -> tuple[Array, Array, Array]:
     """Return d (...), n (..., 3) and t (..., 3, 2) of a surface at points (..., 3)."""
     shape, count = points.shape[:-1], math.prod(points.shape[:-1])
+    if not count:  # which CasADi does not map over
+        return np.zeros(shape), np.zeros((*shape, 3)), np.zeros((*shape, 3, 2))
     d, n, t = (np.array(part) for part in frame_function(surface).map(count)(points.reshape(count, 3).T))
     return d.reshape(shape), n.T.reshape(*shape, 3), t.reshape(3, count, 2).transpose(1, 0, 2).reshape(*shape, 3, 2)
 

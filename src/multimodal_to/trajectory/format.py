@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
-FORMATS: Mapping[int, str] = MappingProxyType(
+from multimodal_to.values import FrozenMapping
+
+FORMATS: Mapping[int, str] = FrozenMapping(
     {
         1: "all quantities, time, names of robot and scenario",
         2: "adds `scenario_json`",
@@ -29,7 +30,7 @@ class Entry:
     since: int = 1
 
 
-ENTRIES: Mapping[str, Entry] = MappingProxyType(
+ENTRIES: Mapping[str, Entry] = FrozenMapping(
     {
         "format_version": Entry(kind="whole number", meaning="version of the file's format"),
         "robot": Entry(kind="text", meaning="name of the robot"),

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Protocol
 
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.models.joint_units import joint_units
 from multimodal_to.models.robot import Robot
+from multimodal_to.values import FrozenMapping
 
 SCALAR = ("",)
 XYZ = ("x", "y", "z")
@@ -61,7 +61,7 @@ def _scalar(of: str, unit: str, meaning: str) -> Quantity:
     return Quantity(axes=SCALAR, of=of, unit=unit, meaning=meaning)
 
 
-QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
+QUANTITIES: Mapping[str, Quantity] = FrozenMapping(
     {
         "com_position": _vector("robot", "m", "x, position of the CoM"),
         "com_velocity": _vector("robot", "m/s", "ẋ, velocity of the CoM"),

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.values import FrozenMapping
 
 BACKWARD_EULER = "backward Euler"
 LEAPFROG = "leapfrog"
@@ -31,12 +31,12 @@ ACCELERATIONS = ("com_acceleration", "angular_momentum_rate", "thrust_accelerati
 """The differences between two intervals: column k is of knot k − 1, where the two meet."""
 
 _BETWEEN = {**dict.fromkeys(VELOCITIES, 0.5), **dict.fromkeys(ACCELERATIONS, 1.0)}
-INSTANTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
+INSTANTS: Mapping[str, Mapping[str, float]] = FrozenMapping(
     {
-        BACKWARD_EULER: MappingProxyType({}),
-        LEAPFROG: MappingProxyType({**_BETWEEN, "contact_force_rates": 0.5}),
-        STAGGERED: MappingProxyType({**_BETWEEN, "contact_force_rates": 1.0, **dict.fromkeys(HELD, 0.5)}),
-        SAMPLED: MappingProxyType({}),
+        BACKWARD_EULER: FrozenMapping({}),
+        LEAPFROG: FrozenMapping({**_BETWEEN, "contact_force_rates": 0.5}),
+        STAGGERED: FrozenMapping({**_BETWEEN, "contact_force_rates": 1.0, **dict.fromkeys(HELD, 0.5)}),
+        SAMPLED: FrozenMapping({}),
     }
 )
 """How far before knot k the quantities of column k are, in intervals; those that are not named are at the knot."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 
 from multimodal_to.errors import InputError, MultimodalError, listed
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory.trajectory import Trajectory
+from multimodal_to.values import FrozenMapping
 
-_NAMES: Mapping[str, str] = MappingProxyType(
+_NAMES: Mapping[str, str] = FrozenMapping(
     {"joints": "joint_names", "contact points": "contact_names", "jets": "jet_names"}
 )
 

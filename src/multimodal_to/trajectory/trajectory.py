@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import LONGEST, InputError, TrajectoryError, listed, shortened, unknown
 from multimodal_to.files.writing import whole
 from multimodal_to.models.attitude import continuous
@@ -18,6 +19,7 @@ from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing, text, texts
 from multimodal_to.trajectory.format import ENTRIES, FORMAT_VERSION, FORMATS
 from multimodal_to.trajectory.quantities import QUANTITIES, labels
+from multimodal_to.values import Value
 
 _NO_ROTATION = 1e-6
 """A quaternion all of whose parts are smaller cannot be made a unit one."""
@@ -27,7 +29,7 @@ _LABELS = ("joint_names", "contact_names", "jet_names")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Trajectory:
+class Trajectory(Value):
     """Every quantity of the optimal control problem at every knot.
 
     Column k is of knot k or of the interval that ends there, as `rule` says: `trajectory.rules` has the instants. Rates
@@ -72,6 +74,8 @@ class Trajectory:
     solve_json: str = ""  # how it was solved, as `solving.record` writes it; empty where no solver made it
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        check_fields(self, TrajectoryError)
         if self.time.ndim != 1 or self.time.size < 2:
             raise TrajectoryError(f"'time' has shape {self.time.shape}; expected (knots + 1,) with at least two knots")
         if not (np.isfinite(self.time).all() and (np.diff(self.time) > 0).all()):
@@ -93,7 +97,7 @@ class Trajectory:
                 raise TrajectoryError(f"'{label}' are {listed(names)}; expected each name once")
         if np.abs(self.base_quaternion_xyzw).max(axis=0).min() < _NO_ROTATION:
             raise TrajectoryError("'base_quaternion_xyzw' holds a quaternion next to zero, which is no rotation")
-        object.__setattr__(self, "base_quaternion_xyzw", continuous(self.base_quaternion_xyzw))
+        self.__setstate__({"base_quaternion_xyzw": continuous(self.base_quaternion_xyzw)})
 
     @property
     def knots(self) -> int:
@@ -139,6 +143,7 @@ class Trajectory:
             parts.append(f"integration by {self.rule}")
         return shortened("; ".join(parts), LONGEST)
 
+    @checked
     def labels(self, name: str) -> tuple[str, ...]:
         """Return what the rows of a quantity are called, such as `l_knee` or `l_sole_1 z`.
 
@@ -147,6 +152,7 @@ class Trajectory:
         """
         return labels(name, self)
 
+    @checked
     def times(self, name: str) -> Array:
         """Return at which times the columns of a quantity are [s], (knots + 1,), as the rule has it.
 
@@ -159,6 +165,7 @@ class Trajectory:
             raise InputError(unknown("quantity", name, QUANTITIES))
         return rules.instants(self.time, self.rule, name)
 
+    @checked
     def per_contact(self, name: str) -> Array:
         """Return a contact quantity as (contacts, rows, knots + 1), for example forces as (contacts, 3, knots + 1).
 
@@ -175,6 +182,7 @@ class Trajectory:
         """Return the sum of the world-vertical contact forces [N], (knots + 1,)."""
         return np.asarray(self.per_contact("contact_forces")[:, 2].sum(axis=0))
 
+    @checked
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the trajectory as a compressed `.npz` without pickle; the file appears whole or not at all.
 
@@ -200,6 +208,7 @@ class Trajectory:
         return Path(path)
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str]) -> Trajectory:
         """Read a trajectory that `save` wrote, of this format version or an older one.
 
