@@ -119,9 +119,9 @@ def limits() -> str:
                 "URDF",
                 "`ModelError`",
                 f"At most {_size(urdf.LARGEST_URDF)}, {urdf.MOST_ELEMENTS} elements, {urdf.MOST_LINKS} links and as "
-                "many joints. No document type, so no entities. One tree with one root. Numbers are finite and at most "
-                f"{urdf.LARGEST_NUMBER:.0e}; only joint limits may be larger. Collision shapes, transmissions and "
-                "simulators' elements are not looked at.",
+                "many joints. No document type, so no entities. One tree with one root. Numbers are XML's, finite and "
+                f"at most {urdf.LARGEST_NUMBER:.0e}; only joint limits may be larger. Collision shapes, transmissions "
+                "and simulators' elements are not looked at.",
             ),
             (
                 "meshes",

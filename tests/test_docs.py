@@ -14,6 +14,7 @@ import multimodal_to as mt
 from multimodal_to.adam.urdf import LARGEST_URDF
 from multimodal_to.auditing import PROPERTIES, Of
 from multimodal_to.files.reading import LARGEST_TOML
+from multimodal_to.models.joint_units import either
 from multimodal_to.models.terrain import SURFACES
 from multimodal_to.replay.meshes import LARGEST_MESH
 from multimodal_to.trajectory import ENTRIES, FORMATS, QUANTITIES, archive
@@ -65,7 +66,8 @@ def test_every_quantity_entry_and_version_of_the_file_is_on_its_page():
     text = filled("reference/trajectory.md")
     for name, quantity in QUANTITIES.items():
         row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
-        assert f"| {quantity.unit} |" in row
+        unit = either(quantity.unit) if quantity.of == "joint" else quantity.unit
+        assert f"| {unit} |" in row
     assert all(f"| `{name}` |" in text for name in ENTRIES)
     assert all(f"\n| {version} | " in text for version in FORMATS)
     assert f"versions {min(FORMATS)} to {max(FORMATS)}" in filled("files.md")

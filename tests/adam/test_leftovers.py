@@ -63,6 +63,7 @@ LOST = {
     "a link in a link": (robot(TRUNK.replace("</link>", LEG + "</link>")), "expected <link> in <robot>"),
     "an inertial with a capital": (robot(TRUNK, LEG.replace("inertial", "Inertial"), HIP), "<Inertial> in <link"),
     "an axis in a link": (robot('<link name="trunk"><axis xyz="0 0 1"/></link>'), "expected <axis> in <joint>"),
+    "an include of another kind": (robot(TRUNK, '<include filename="leg.urdf"/>'), "<include> in <robot> is not read"),
     "a joint of Drake's": (
         robot(TRUNK, LEG, HIP.replace("joint", "drake:joint"), more='xmlns:drake="http://drake.mit.edu"'),
         "<drake:joint name=.hip.> in <robot>",

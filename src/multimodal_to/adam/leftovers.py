@@ -29,13 +29,13 @@ _OTHERS = {
     "inertial": set[str](),
 }
 """Elements that other programs read, and that are no part of the robot."""
-_PARTS = {name.lower() for names in _OWN.values() for name in names - {"origin", "dynamics"}} | {"robot"}
+_PARTS = {name.lower() for names in _OWN.values() for name in names - {"origin", "dynamics"}} | {"robot", "include"}
 _ONCE = {
     "link": ("inertial",),
     "inertial": ("origin", "mass", "inertia"),
     "joint": ("parent", "child", "origin", "axis", "limit", "mimic"),
 }
-_NAMES = {"link": ("name", "link"), "joint": ("name", "type", "joint"), "material": ("name",)}
+_NAMES = {"link": ("name", "link"), "joint": ("name", "type", "joint")}
 _UNEXPANDED = re.compile(r"\$+[{(]")
 _EXPAND = "expand the file with xacro first"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from typing import Any, Self
 
 import casadi as cs
@@ -97,6 +98,19 @@ class Library:
     def gravity(self) -> np.ndarray:
         """Return the acceleration of free fall in world axes, (3,) [m/s²]; it cannot be written to."""
         return self._gravity
+
+    def with_gravity(self, gravity: ArrayLike) -> Self:
+        """Return the same robot under another gravity; this one keeps its own.
+
+        Args:
+            gravity: acceleration of free fall in world axes [m/s²]: three numbers, or six with three zeros behind.
+
+        Raises:
+            InputError: gravity is not three finite numbers.
+        """
+        other = copy(self)
+        other._gravity = _checked_gravity(gravity)
+        return other
 
     @property
     def g(self) -> np.ndarray:

@@ -26,6 +26,7 @@ from multimodal_to.models.terrain import FlatGround
 from multimodal_to.scenarios.data import stored
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.derived import (
     at_knots,
     at_velocities,
@@ -71,6 +72,8 @@ class Audit:
 def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None) -> Audit:
     """Check a trajectory against the physics of its robot.
 
+    Gravity and the robot's friction are those that the trajectory keeps; where it keeps none, the robot's.
+
     Args:
         robot: the robot that the trajectory is for.
         trajectory: as loaded from its file.
@@ -81,6 +84,7 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         InputError: the trajectory is for another robot, or the scenario allows more of a property that is not judged.
     """
     refuse_other_robot(trajectory, robot)
+    robot = under_conditions(robot, trajectory)
     scenario = scenario or stored(trajectory)
     phases = flight_phases(robot, trajectory)
     motion = Motion.of(robot, trajectory)

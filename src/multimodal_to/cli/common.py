@@ -24,6 +24,7 @@ from multimodal_to.scenarios.files import change, load
 from multimodal_to.scenarios.scenario import Margins, Scenario
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.archive import read_archive
+from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.importing import import_arrays
 from multimodal_to.trajectory.sameness import refuse_other_robot
 
@@ -87,7 +88,7 @@ def loaded(file: Path, robot: str) -> tuple[Robot, Trajectory]:
             f"'{file}' names its robot as the path '{trajectory.robot}', which is not followed; name the robot with "
             "--robot"
         )
-    the_robot = load_robot(robot or trajectory.robot).with_jets(trajectory.jet_names)
+    the_robot = under_conditions(load_robot(robot or trajectory.robot).with_jets(trajectory.jet_names), trajectory)
     refuse_other_robot(trajectory, the_robot, what=f"'{file}'", of=("joints", "contact points"), error=TrajectoryError)
     return the_robot, trajectory
 

@@ -19,7 +19,9 @@ from multimodal_to.cli.common import File, RobotOption, app, described, loaded, 
 from multimodal_to.cli.completion import robots_or_urdfs
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import load_robot
+from multimodal_to.trajectory.conditions import differences
 
+_SAID = 5  # so many differences of robots are printed
 robot_app = typer.Typer(help="Look at robots.", no_args_is_help=True)
 app.add_typer(robot_app, name="robot")
 
@@ -40,8 +42,10 @@ def audit_file(
     """
     the_robot, trajectory = loaded(file, robot)
     report, unusual = audit(the_robot, trajectory), trajectory.unusual_formulation()
+    others = differences(the_robot, trajectory)
     if as_json:
-        typer.echo(json.dumps({**_as_data(report), "formulation": unusual}, indent=2, ensure_ascii=False))
+        more = {"formulation": unusual, "planned_for": list(others)}
+        typer.echo(json.dumps({**_as_data(report), **more}, indent=2, ensure_ascii=False))
         raise typer.Exit(0 if report.holds else 1)
     narrow = [Column(title, no_wrap=True) for title in ("property", "worst", "limit", "unit", "knot")]
     table = Table(*narrow, "where", Column(no_wrap=True), box=None, pad_edge=False)
@@ -66,6 +70,10 @@ def audit_file(
         )
     if unusual:
         out.print(f"the problem had {unusual}; the audit does not judge these", soft_wrap=True)
+    for difference in others[:_SAID]:
+        out.print(f"planned for another robot: {difference}", soft_wrap=True)
+    if len(others) > _SAID:
+        out.print(f"and {len(others) - _SAID} more")
     raise typer.Exit(0 if report.holds else 1)
 
 

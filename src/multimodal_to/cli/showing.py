@@ -25,6 +25,7 @@ from multimodal_to.errors import InputError, OutputError, unknown
 from multimodal_to.exporting.export import EXPORTS
 from multimodal_to.models.robot import load_robot
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.conditions import under_conditions
 
 
 @app.command()
@@ -55,7 +56,7 @@ def plot(
     if figure not in (*FIGURES, "all"):
         raise InputError(unknown("figure", figure, (*FIGURES, "all")))
     opened = [loaded(file, robot) for file in files]
-    the_robot = load_robot(robot or opened[0][1].robot)
+    the_robot = under_conditions(load_robot(robot or opened[0][1].robot), opened[0][1])
     trajectories = [trajectory for _, trajectory in opened]
     writable(target.parent)
     for name in FIGURES if figure == "all" else (figure,):

@@ -49,6 +49,7 @@ from multimodal_to.solving import Ipopt, Relaxation, Solution, relax
 from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.derived import largest_torques
 
 _VIOLATIONS_SHOWN = 5
@@ -115,12 +116,16 @@ def _show_torques(file: Path, robot: str) -> None:
     """Print the largest torque of every joint, the nearest to its effort limit first."""
     if file.suffix != ".npz":
         raise InputError(f"--torques goes with a trajectory file; '{file}' is no .npz")
-    numbers = [Column(title, justify="right") for title in ("largest torque", "at [s]", "effort", "share")]
-    table = Table("joint", *numbers, box=None, pad_edge=False)
-    for one in largest_torques(*loaded(file, robot)):
+    found = largest_torques(*loaded(file, robot))
+    units = {one.unit for one in found}
+    head = f" [{units.pop()}]" if len(units) == 1 else ""  # one unit stands in the head, several with each number
+    titles = (f"largest torque{head}", "at [s]", f"effort{head}", "share")
+    table = Table("joint", *(Column(title, justify="right") for title in titles), box=None, pad_edge=False)
+    for one in found:
+        unit = "" if head else f" {one.unit}"
         limited = math.isfinite(one.effort)
-        limit, share = (f"{one.effort:g} {one.unit}", f"{100 * one.over_effort:.0f} %") if limited else ("none", "")
-        table.add_row(one.joint, f"{one.torque:.1f} {one.unit}", f"{one.when:.2f}", limit, share)
+        limit, share = (f"{one.effort:g}{unit}", f"{100 * one.over_effort:.0f} %") if limited else ("none", "")
+        table.add_row(one.joint, f"{one.torque:.1f}{unit}", f"{one.when:.2f}", limit, share)
     out.print(table)
 
 
@@ -222,6 +227,8 @@ def solve(
     chosen_solver = choose(linear_solver)  # before anything takes time
     console = Console(highlight=False, markup=False, emoji=False, quiet=quiet)
     the_robot = load_robot(task.robot)
+    if resume is not None and task.start is not None:
+        the_robot = under_conditions(the_robot, task.start)
     _refuse_hopeless(examine(the_robot, scenario, task.formulation), console, force)
     folder = writable(output or (Path("results") / scenario.name if resume is None else resume.parent))
     started = time.perf_counter()

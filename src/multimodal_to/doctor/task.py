@@ -102,8 +102,8 @@ class Task:
 
     @property
     def posture(self) -> Posture:
-        """Return the posture that the problem is built around, as far as there is one; else home."""
-        return self.start_posture or self.end_posture or self.robot.home
+        """Return the posture that the problem is built around, as far as there is one; else upright."""
+        return self.start_posture or self.end_posture or self.robot.upright
 
     @property
     def parameters(self) -> Parameters:

@@ -206,6 +206,14 @@ class Robot:
                 raise ModelError(unknown("jet", name, known))
         return replace(self, jets=tuple(known[name] for name in names))
 
+    def with_gravity(self, gravity: Sequence[float] | Array) -> Robot:
+        """Return the robot under another gravity: three numbers in world axes [m/s²].
+
+        Raises:
+            InputError: gravity is not three finite numbers.
+        """
+        return replace(self, kindyn=self.kindyn.with_gravity(gravity))
+
     def group_indices(self, group: str) -> list[int]:
         """Return where the joints of a named group stand in s.
 

@@ -95,12 +95,12 @@ def prepared(robot: Robot, scenario: Scenario) -> tuple[Robot, Posture]:
 
 
 def _standing(robot: Robot, scenario: Scenario) -> Posture:
-    """Return the posture in which the robot stands where the motion starts or, if in the air, where it ends."""
+    """Return the posture in which the robot stands where the motion starts or, if in the air, ends; else upright."""
     if scenario.start is Start.STANDING:
         return standing_posture(robot, scenario.surface, scenario.initial_com)
     if scenario.terminal is Terminal.STANDING:
         return standing_posture(robot, scenario.surface, scenario.final_com)
-    return robot.home
+    return robot.upright
 
 
 def _target(robot: Robot, scenario: Scenario, standing: Posture) -> Posture:

@@ -23,6 +23,7 @@ from multimodal_to.simulation.model import DAMPING, STIFFNESS, TIME_STEP, Simula
 from multimodal_to.simulation.reference import Reference, reference
 from multimodal_to.simulation.stabiliser import Correction, Turbines, correct, rotation_vector
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.sameness import refuse_other_robot
 
 HOLD = 1.0  # how long the end of the plan is held [s]
@@ -81,6 +82,7 @@ def play(
     if not 0.0 <= delay <= 1.0:
         raise InputError(f"the delay is {delay:g} intervals; expected 0 to 1")
     refuse_other_robot(plan, robot, what="the plan", error=TrajectoryError)
+    robot = under_conditions(robot, plan)
     scenario = stored(plan)
     friction = robot.friction if scenario is None or scenario.friction is None else scenario.friction
     low, high = (getattr(plan.com_position[:2], end)(axis=1) for end in ("min", "max"))

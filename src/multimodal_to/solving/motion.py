@@ -9,7 +9,7 @@ from multimodal_to.models.terrain import SURFACES
 from multimodal_to.ocp.problem import Problem
 from multimodal_to.scenarios.data import to_json
 from multimodal_to.scenarios.scenario import Scenario
-from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory import Trajectory, conditions
 
 
 def motion(problem: Problem, x: Array, solve_json: str = "") -> Trajectory:
@@ -34,6 +34,7 @@ def motion(problem: Problem, x: Array, solve_json: str = "") -> Trajectory:
         scenario=problem.scenario.name,
         scenario_json=_kept(problem.scenario),
         solve_json=solve_json,
+        robot_json=conditions.to_json(robot),
         rule=problem.formulation.rule.name,
         time=time_grid,
         joint_names=robot.joint_names,

@@ -15,6 +15,7 @@ from multimodal_to.adam.spatial import Array, homogeneous
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import Surface, frame_function
 from multimodal_to.trajectory import rules
+from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.quantities import QUANTITIES, SCALAR, Quantity, row_units
 from multimodal_to.trajectory.resampling import resample
 from multimodal_to.trajectory.trajectory import Trajectory
@@ -320,7 +321,8 @@ def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
     mean velocity ν̄. C ν is a quadratic form c(ν), so this is ½ (c(ν⁻) + c(ν⁺)) = c(ν̄) + c(½ (ν⁺ − ν⁻)). It is what
     the momentum's rows say. With c(ν̄) alone the wrench left for the base is several times larger.
     """
-    robot, count = robot.with_jets(trajectory.jet_names), trajectory.time.size
+    robot = under_conditions(robot.with_jets(trajectory.jet_names), trajectory)
+    count = trajectory.time.size
     names = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
     velocities = np.vstack([at_knots(trajectory, name) for name in names])
     accelerations = np.vstack([accelerations_at_knots(trajectory, name) for name in names])

@@ -12,6 +12,7 @@ FORMATS: Mapping[int, str] = MappingProxyType(
         2: "adds `scenario_json`",
         3: "adds `solve_json`",
         4: "adds `rule`",
+        5: "adds `robot_json`",
     }
 )
 """The versions of the file that are read, and what each one brought."""
@@ -45,6 +46,12 @@ ENTRIES: Mapping[str, Entry] = MappingProxyType(
             kind="text",
             since=4,
             meaning="name of the integration rule, which says at which instant of the interval each quantity is",
+        ),
+        "robot_json": Entry(
+            kind="text, JSON",
+            since=5,
+            meaning="what the answer depends on beside the task: gravity, friction, and the robot's mass, limits, "
+            "locked joints and jets; empty where it is not known, and then those of the robot at hand hold",
         ),
         "time": Entry(kind="numbers, (N + 1,)", meaning="time of the knots [s], increasing"),
         "knots": Entry(

@@ -68,6 +68,7 @@ class Trajectory:
 
     scenario_json: str = ""  # the complete scenario, as `scenarios.data` writes it; empty where none is known
     rule: str = rules.BACKWARD_EULER  # of integration, which says at which instant each quantity is: `trajectory.rules`
+    robot_json: str = ""  # what else the answer depends on, as `trajectory.conditions` writes it; empty: not known
     solve_json: str = ""  # how it was solved, as `solving.record` writes it; empty where no solver made it
 
     def __post_init__(self) -> None:
@@ -186,6 +187,7 @@ class Trajectory:
             "scenario": np.array(self.scenario),
             "scenario_json": np.array(self.scenario_json),
             "solve_json": np.array(self.solve_json),
+            "robot_json": np.array(self.robot_json),
             "rule": np.array(self.rule),
             "time": self.time,
             "knots": np.array(self.knots),
@@ -220,7 +222,7 @@ class Trajectory:
         refuse_missing(stored, ("robot", "scenario", "time", *_LABELS, *QUANTITIES), source)
         fields: dict[str, Any] = {name: numbers(stored, name, source) for name in ("time", *QUANTITIES)}
         fields |= {name: texts(stored, name, source) for name in _LABELS}
-        words = ("robot", "scenario", "scenario_json", "solve_json", "rule")
+        words = ("robot", "scenario", "scenario_json", "solve_json", "robot_json", "rule")
         fields |= {name: text(stored, name, source) for name in words}
         fields["rule"] = fields["rule"] or rules.BACKWARD_EULER  # the one that there was before files said it
         try:
