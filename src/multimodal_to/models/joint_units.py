@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from multimodal_to.models.robot import Robot
+from multimodal_to.values import FrozenMapping
 
-SLIDING: Mapping[str, str] = MappingProxyType({"rad": "m", "rad/s": "m/s", "rad/s²": "m/s²", "N m": "N"})
+SLIDING: Mapping[str, str] = FrozenMapping({"rad": "m", "rad/s": "m/s", "rad/s²": "m/s²", "N m": "N"})
 """The unit of a prismatic joint's value, by that of a revolute joint's."""
 
 

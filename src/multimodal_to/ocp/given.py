@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from types import MappingProxyType
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.variables import Bounds
 from multimodal_to.scenarios.scenario import Scenario, Start
 from multimodal_to.trajectory import rules
+from multimodal_to.values import FrozenMapping
 
 NO_FORCE = 0.01
 """Largest contact force component left at a knot that has to be free of contact [N]."""
@@ -116,7 +116,7 @@ def set_start(bounds: Bounds, robot: Robot, scenario: Scenario, initial: State, 
     bounds.upper["contact_forces"][above, 0] = left[above]
 
 
-AT_START: Mapping[str, Callable[[Robot, State], Array]] = MappingProxyType(
+AT_START: Mapping[str, Callable[[Robot, State], Array]] = FrozenMapping(
     {
         "momentum_at_start": lambda robot, state: _kinematics(robot, state).momentum,
         "base_twist_at_start": lambda robot, state: np.concatenate(
