@@ -7,15 +7,14 @@ import pickle
 import runpy
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 from filelock import FileLock
 
 import multimodal_to as mt
+from places import EXAMPLES
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
 SHORT = {
     "take_off": (35, 0.2, 0.2),
     "landing": (35, 0.2, 0.2),

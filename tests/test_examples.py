@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from conftest import EXAMPLES
+from places import EXAMPLES
 
 NAMES = sorted(file.stem for file in EXAMPLES.glob("[0-9]*.py"))
 
