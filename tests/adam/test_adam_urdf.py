@@ -265,6 +265,8 @@ def test_the_limits_of_a_joint_are_kept_by_its_followers() -> None:
     assert limits(i=limit(-1, 2), j=wide, k=limit(7, 8)) == (-1, 2, 2.5, 10)  # nothing in common: a finding
     found = [str(finding) for finding in describe(mimics(i=limit(-1, 2), j=wide, k=limit(7, 8))).findings]
     assert "joint 'k' follows 'i' at 2 i + 0.1, which leaves its own range 7 to 8" in " ".join(found)
+    opposite = describe(mimics(i=limit(0, 2), j=limit(0.1, 9), k=wide))  # as both of PR2's grippers
+    assert "joint 'i' has the range 0 to 0 with what its mimic joints allow, so it cannot move" in str(opposite)
     assert limits(i=limit(-1, 2), j=wide, k='<limit effort="10" velocity="5"/>')[:2] == (-1, 2)  # it states no range
 
 

@@ -118,7 +118,9 @@ def findings(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tupl
         if joint.name in tree.followers:
             texts += _follower_findings(joint, tree.followers[joint.name], moving)
         elif joint.kind != "fixed":
-            texts += _joint_findings(moving.get(joint.name, joint), carried.get(joint.name))
+            kept = moving.get(joint.name, joint)
+            why = "" if (kept.lower, kept.upper) == (joint.lower, joint.upper) else " with what its mimic joints allow"
+            texts += _joint_findings(kept, carried.get(joint.name), why)
         found += [Finding(subject=f"joint '{joint.name}'", text=text) for text in texts]
     for group in massless_motions(tree):
         if len(group) > 1 or not group[0] or carried[group[0]] > 0:  # else the joint itself has said it
@@ -155,14 +157,20 @@ def is_placeholder(effort: float) -> bool:
     return bool(np.isfinite(effort) and (effort >= EFFORT_PLACEHOLDER or effort <= 0))
 
 
-def _joint_findings(joint: Joint, carried_mass: float | None) -> Iterator[str]:
-    """Yield what looks wrong about one joint that can move; `carried_mass` [kg] is None if it is locked."""
+def _joint_findings(joint: Joint, carried_mass: float | None, why: str) -> Iterator[str]:
+    """Yield what looks wrong about one joint that can move.
+
+    Args:
+        joint: in the range that is left to it.
+        carried_mass: what it moves [kg], None if it is locked.
+        why: its range is smaller than the URDF says, as a part of a sentence; empty where it is not.
+    """
     if is_placeholder(joint.effort):
         yield f"has the effort limit {joint.effort:g}, which looks like a placeholder"
     if np.isfinite(joint.velocity) and (joint.velocity >= VELOCITY_PLACEHOLDER or joint.velocity <= 0):
         yield f"has the velocity limit {joint.velocity:g}, which looks like a placeholder"
     if joint.lower == joint.upper:
-        yield f"has the range {joint.lower:g} to {joint.upper:g}, so it cannot move"
+        yield f"has the range {joint.lower:g} to {joint.upper:g}{why}, so it cannot move"
     if joint.kind == "revolute" and joint.upper - joint.lower > 4 * np.pi and np.isfinite(joint.upper - joint.lower):
         yield f"has the range {joint.lower:g} to {joint.upper:g} rad, which looks like a placeholder or degrees"
     if carried_mass == 0:
@@ -220,7 +228,8 @@ def _branches(tree: Tree, links: Sequence[Link], joints: Sequence[Joint]) -> tup
         branches.append(Branch(depth=depth, link=link_of[name], joint=above, state=state))
         for joint in reversed(below.get(name, [])):
             if joint.name in tree.followers:
-                state = f"follows {tree.followers[joint.name].joint}: {tree.followers[joint.name]}"
+                how = tree.followers[joint.name]
+                state = f"follows {how.joint}" + (f": {how}" if str(how) != how.joint else "")
             elif joint.name in tree.locked:
                 state = f"locked at {tree.locked[joint.name]:g}"
             else:

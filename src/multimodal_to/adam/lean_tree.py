@@ -230,7 +230,7 @@ def _limited(leader: Joint, followers: Mapping[str, Mimic], by_name: Mapping[str
         upper.append(ends[1])
         velocity += [follower.velocity / size] if follower.velocity > 0 else []
         effort += [follower.effort * size] if follower.effort > 0 else []
-    low, high = max(lower), min(upper)
+    low, high = max(lower) + 0.0, min(upper) + 0.0  # no −0
     if low > high:
         low, high = leader.lower, leader.upper
     return replace(leader, lower=low, upper=high, velocity=min(velocity), effort=min(effort))

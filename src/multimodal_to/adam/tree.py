@@ -37,7 +37,7 @@ class Mimic:
 
     def __str__(self) -> str:
         """Return the follower's position as a formula: `-2 leader + 0.1`."""
-        factor = "" if self.multiplier == 1 else f"{self.multiplier:g} "
+        factor = {1.0: "", -1.0: "-"}.get(self.multiplier, f"{self.multiplier:g} ")
         added = "" if self.offset == 0 else f" {'-' if self.offset < 0 else '+'} {abs(self.offset):g}"
         return f"{factor}{self.joint}{added}"
 
