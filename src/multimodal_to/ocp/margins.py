@@ -42,7 +42,8 @@ def generalised_forces(interval: Interval) -> SX:
     base = Pose(cs.SX(cs.DM.eye(3)), cs.SX(3, 1))  # all of it is in its axes
     for index, jet in enumerate(knot.robot.jets):
         nozzle = forward_kinematics(tree, tree.frame(jet.frame), base, knot.joint_positions)
-        wrenches[jet.frame] = cs.vertcat(thrust_force(nozzle.rotation, knot.thrust[index]), cs.SX(3, 1))
+        force = thrust_force(nozzle.rotation, knot.thrust[index])
+        wrenches[jet.frame] = wrenches.get(jet.frame, cs.SX(6, 1)) + cs.vertcat(force, cs.SX(3, 1))
     acceleration = interval.rate(lambda knot: knot.base_linear_velocity) - cs.DM(knot.robot.gravity)
     turning = interval.rate(lambda knot: knot.base_angular_velocity)
     in_base = inverse_dynamics(
