@@ -68,6 +68,7 @@ MADE_HERE = {
     "Robot",
     "Solution",
     "StartPoint",
+    "State",
 }
 """What the library makes, and a person reads."""
 

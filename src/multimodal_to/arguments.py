@@ -7,6 +7,7 @@ import os
 import types
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import fields
+from enum import Enum
 from functools import cache, wraps
 from numbers import Integral, Real
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
@@ -156,6 +157,8 @@ def _said(annotation: Any) -> str:
         return "a mapping" + (f" from {_many(inner[0])} to {_many(inner[1])}" if len(inner) == 2 else "")
     if kind in (tuple, Sequence, Iterable):
         return f"a sequence of {_many(inner[0])}" if inner else "a sequence"
+    if isinstance(kind, type) and issubclass(kind, Enum):
+        return f"one of {', '.join(member.name for member in kind)}"
     name = str(getattr(kind, "__name__", kind))
     return _WORDS.get(kind) or f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
 

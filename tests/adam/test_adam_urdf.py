@@ -307,14 +307,14 @@ def test_a_locked_joint_is_one_that_stands_still() -> None:
     [
         ({"joints_name_list": ["knee"]}, ModelError, "unknown joint 'knee'"),
         ({"joints_name_list": ["l_knee", "l_knee"]}, ModelError, "given twice"),
-        ({"joints_name_list": "l_knee"}, ModelError, "list of names"),
+        ({"joints_name_list": "l_knee"}, InputError, "sequence of texts"),
         ({"joints_name_list": ["l_knee"], "locked_joints": {"l_knee": 0}}, ModelError, "both moving and locked"),
         ({"locked_joints": {"l_knee": np.nan}}, ModelError, "finite number"),
         ({"root_link": "head"}, ModelError, "root link is 'root_link', not 'head'"),
         ({"gravity": [0, 0]}, InputError, "three finite numbers"),
         ({"gravity": [0, 0, np.nan]}, InputError, "three finite numbers"),
         ({"gravity": [0, 0, -9.8, 0, 0, 1]}, InputError, "three finite numbers"),
-        ({"representation": "mixed"}, InputError, "unknown representation 'mixed'; available: BODY_FIXED"),
+        ({"representation": "mixed"}, InputError, "'representation' is 'mixed'; expected one of BODY_FIXED"),
     ],
 )
 def test_arguments_that_fit_no_robot_are_refused(arguments: dict, error: type, expected: str) -> None:

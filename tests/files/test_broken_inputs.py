@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import subprocess
@@ -82,6 +83,18 @@ def arrays(*says: str, command: str = "audit in.npz", **changes: object) -> Brok
         np.savez(folder / "in.npz", **{name: array for name, array in content.items() if array is not None})
 
     return Broken(command=command, error=TrajectoryError, says=says, make=make)
+
+
+def flipped(good: bytes) -> bytes:
+    """The file with one bit of an array's numbers changed."""
+    with zipfile.ZipFile(io.BytesIO(good)) as members:
+        header = members.getinfo("thrust.npy").header_offset
+    lengths = (
+        int.from_bytes(good[header + 26 : header + 28], "little"),
+        int.from_bytes(good[header + 28 : header + 30], "little"),
+    )
+    at = header + 30 + sum(lengths) + 60  # behind the names of the local header
+    return good[:at] + bytes([good[at] ^ 1]) + good[at + 1 :]
 
 
 def archive(change: Callable[[bytes], bytes], *says: str) -> Broken:
@@ -211,7 +224,7 @@ BROKEN = {
     "no trajectory": Broken(command="audit none.npz", error=TrajectoryError, says=("no trajectory file 'none.npz'",)),
     "a text": archive(lambda good: b"hello", "it is no .npz archive"),
     "half a file": archive(lambda good: good[: len(good) // 2], "is not a trajectory file"),
-    "a flipped byte": archive(lambda good: good[:3000] + bytes([good[3000] ^ 1]) + good[3001:], "is not a trajectory"),
+    "a flipped byte": archive(flipped, "is not a trajectory"),
     "a zip bomb": Broken(command="audit in.npz", error=TrajectoryError, says=("unpacks to 300 MB",), make=bomb),
     "a pickle": arrays("'thrust.npy' holds pickled objects", thrust=np.array([Trap()], dtype=object)),
     "a quantity too few": arrays("lacks throttle", throttle=None),

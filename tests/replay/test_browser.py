@@ -159,13 +159,13 @@ def test_snapshots_are_taken_where_flight_begins_by_default(ironcub, trajectory)
     assert times[-1] == DURATION
 
 
-def test_ghosts_on_a_step_stand_apart(ironcub, trajectory):
+def test_ghosts_that_climb_stand_side_by_side_and_need_no_room_along_their_way(ironcub, trajectory):
     stairs = Stairs(edges=(0.3,), heights=(0.0, 0.1), direction=(-1.0, 0.0))
     kept = to_json(replace(scenarios.take_off(), surface=stairs))
     com = trajectory.com_position.copy()
     com[0] = -0.5 * trajectory.time
     walking = replace(trajectory, scenario_json=kept, com_position=com)
-    np.testing.assert_allclose(replay.snapshot_times(ironcub, walking), [0.0, 1.0, DURATION])
+    np.testing.assert_allclose(replay.snapshot_times(ironcub, walking), [0.0, 0.5, 1.0, 1.5, DURATION])
 
 
 @needs_browser

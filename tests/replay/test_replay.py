@@ -11,7 +11,7 @@ import umsgpack
 import yourdfpy
 
 from hopper import hopper
-from multimodal_to import replay, scenarios
+from multimodal_to import children, replay, scenarios
 from multimodal_to.errors import InputError, OutputError
 from multimodal_to.models.robot import load_robot
 from multimodal_to.models.terrain import Stairs
@@ -323,8 +323,7 @@ def test_the_live_viewer_serves_the_same_scene_without_a_word(robot, trajectory,
     finally:
         window = visualizer.window
         window.zmq_socket.close()
-        window.server_proc.kill()
-        window.server_proc.communicate()
+        children.end(window.server_proc)
     assert served.count("fetch(") >= len(stage.objects)
     captured = capfd.readouterr()
     assert captured.out == captured.err == ""

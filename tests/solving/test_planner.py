@@ -94,12 +94,12 @@ def test_a_given_start_is_of_the_order_of_the_rule(robot, task, moving):
         away = replace(free, knots=knots, interval_min=0.4 / knots, interval_max=0.4 / knots)
         formulation = mt.Formulation.executable().with_terms(held)
         problem = mt.build(robot, away, formulation, initial=moving)
-        problem = replace(problem, lower=problem.lower.copy(), upper=problem.upper.copy())
+        lower, upper = problem.lower.copy(), problem.upper.copy()
         last = problem.layout.size * knots
         here = problem.layout.rows["com_position"]
-        problem.lower[last + here.start : last + here.stop] = -1.5  # the end is found
-        problem.upper[last + here.start : last + here.stop] = 1.5
-        solution = mt.solve(problem)
+        lower[last + here.start : last + here.stop] = -1.5  # the end is found
+        upper[last + here.start : last + here.stop] = 1.5
+        solution = mt.solve(replace(problem, lower=lower, upper=upper))
         assert solution.status is mt.Status.OPTIMAL
         return float(solution.trajectory.com_position[2, knots // 2])
 

@@ -6,6 +6,7 @@ import io
 import os
 import subprocess
 import sys
+import warnings
 from contextlib import redirect_stdout
 from pathlib import Path
 
@@ -35,7 +36,8 @@ def show(
     """
     look = appearance(robot.urdf, meshes=meshes)
     server, address = _server()
-    with redirect_stdout(io.StringIO()):  # meshcat prints the address
+    with redirect_stdout(io.StringIO()), warnings.catch_warnings():  # meshcat prints the address
+        warnings.simplefilter("ignore", ResourceWarning)  # and connects twice without closing its first socket
         visualizer = meshcat.Visualizer(zmq_url=address)
     visualizer.window.server_proc = server
     draw_motion(visualizer, robot, trajectory, look, ghost=ghost, live=True)
