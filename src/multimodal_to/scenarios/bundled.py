@@ -222,7 +222,7 @@ def paper(name: str) -> Scenario:
     if name == "walk-to-fly":
         speeds = {"upper_body": 5e5, "legs": 1e5}
         weights = replace(plain.weights, joint_velocities=speeds, contact_force_rates=0.0)
-        return replace(plain, guess_steps=6, weights=weights)
+        return replace(plain, weights=weights)
     if name == "jump":
         return replace(
             plain,
