@@ -4,9 +4,23 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import multimodal_to as mt
 from multimodal_to.models.robot import Robot, bundled_robots, load_robot
 
 DOWN = "3.14159265359 0 0"  # of a frame that pushes the robot up
+
+HOP = mt.Scenario(
+    name="hop",
+    title="hop",
+    knots=30,
+    initial_com=(0.0, 0.0, 0.4),
+    final_com=(0.0, 0.0, 0.6),
+    terminal=mt.Terminal.HOVER,
+    interval_min=0.1,
+    interval_max=0.2,
+    weights=mt.Weights(com_velocity=1e3, com_acceleration=1e2, contact_forces=1e-2),
+)
+"""From standing to a hover 20 cm higher."""
 
 
 def drone(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import multimodal_to as mt
-from drones import drone
+from drones import HOP, drone
 from multimodal_to.auditing import link_clearances
 from multimodal_to.models import capsule_pairs
 from multimodal_to.models.capsule import pair_name
@@ -17,7 +17,6 @@ from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.self_collision import link_distances, link_pair_labels
 from multimodal_to.ocp.variables import Layout
-from multimodal_to.scenarios import Weights
 
 APART = 0.06
 """Farther than the arms are from the chest's jets at home [m]."""
@@ -104,20 +103,9 @@ def test_a_solver_keeps_arms_off_the_jets_by_the_margin(ironcub):
 
 def test_a_robot_without_capsules_has_no_rows_and_is_solved_as_before(tmp_path):
     robot = drone(tmp_path)
-    hop = mt.Scenario(
-        name="hop",
-        title="hop",
-        knots=30,
-        initial_com=(0.0, 0.0, 0.4),
-        final_com=(0.0, 0.0, 0.6),
-        terminal=mt.Terminal.HOVER,
-        interval_min=0.1,
-        interval_max=0.2,
-        weights=Weights(com_velocity=1e3, com_acceleration=1e2, contact_forces=1e-2),
-    )
-    assert link_pair_labels(Parameters.of(robot, hop, robot.home)) == ()
+    assert link_pair_labels(Parameters.of(robot, HOP, robot.home)) == ()
     plain, asked = (
-        mt.solve(mt.build(robot, hop, mt.Formulation.paper().with_terms(*terms))) for terms in ((), (LINKS,))
+        mt.solve(mt.build(robot, HOP, mt.Formulation.paper().with_terms(*terms))) for terms in ((), (LINKS,))
     )
     assert asked.status is plain.status is mt.Status.OPTIMAL
     assert asked.objective == plain.objective

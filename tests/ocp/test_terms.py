@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import multimodal_to as mt
-from drones import drone
+from drones import HOP, drone
 from multimodal_to.errors import FormulationError
 from multimodal_to.ocp import BackwardEuler, Variable, margins, paper
 from multimodal_to.ocp.knot import VARIABLE_NAMES
@@ -492,19 +492,8 @@ class Midpoint:
 def test_an_integration_rule_of_ones_own_is_one_value(tmp_path):
     """The same flight of a body by two rules; each closes its own gaps, and the file says which it was."""
     robot = drone(tmp_path)
-    task = mt.Scenario(
-        name="hop",
-        title="hop",
-        knots=30,
-        initial_com=(0.0, 0.0, 0.4),
-        final_com=(0.0, 0.0, 0.6),
-        terminal=mt.Terminal.HOVER,
-        interval_min=0.1,
-        interval_max=0.2,
-        weights=mt.Weights(com_velocity=1e3, com_acceleration=1e2, contact_forces=1e-2),
-    )
     for rule in (BackwardEuler(), Midpoint()):
-        motion = mt.solve(mt.build(robot, task, replace(PAPER, rule=rule))).trajectory
+        motion = mt.solve(mt.build(robot, HOP, replace(PAPER, rule=rule))).trajectory
         assert motion.solve_record()["status"] == "optimal"
         rise, speed = np.diff(motion.com_position[2]), motion.com_velocity[2]
         acting = speed[1:] if rule.name == "backward Euler" else (speed[1:] + speed[:-1]) / 2

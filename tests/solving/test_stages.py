@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import multimodal_to as mt
-from drones import drone
+from drones import HOP, drone
 from multimodal_to import native
 from multimodal_to.errors import SolverError
 from multimodal_to.native.stage_solver import StageSolver
@@ -60,18 +60,7 @@ def test_leapfrog_within_margins_has_the_same_answer(ironcub, squat):
 
 
 def test_a_body_without_joints_has_the_same_answer(tmp_path):
-    scenario = mt.Scenario(
-        name="hop",
-        title="hop",
-        knots=30,
-        initial_com=(0.0, 0.0, 0.4),
-        final_com=(0.0, 0.0, 0.6),
-        terminal=mt.Terminal.HOVER,
-        interval_min=0.1,
-        interval_max=0.2,
-        weights=mt.Weights(com_velocity=1e3, com_acceleration=1e2, contact_forces=1e-2),
-    )
-    both(mt.build(drone(tmp_path), scenario, mt.Formulation.paper()))
+    both(mt.build(drone(tmp_path), HOP, mt.Formulation.paper()))
 
 
 def test_terms_of_ones_own_are_part_of_the_structure(ironcub, squat):

@@ -13,7 +13,7 @@ from multimodal_to.doctor.task import Task
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.ocp import constraints
-from multimodal_to.ocp.guess import base_transform, contact_positions
+from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.knot import Knot
 
 LONG_LEVER = 100.0
@@ -113,7 +113,7 @@ def knot_of(task: Task, posture: Posture, forces: cs.SX, thrust: cs.SX) -> Knot:
     count, jets = len(robot.joint_names), len(robot.jets)
     return Knot(
         robot=robot,
-        com_position=cs.SX(com_of(task, posture)),
+        com_position=cs.SX(robot.com_at(posture)),
         com_velocity=cs.SX.zeros(3),
         angular_momentum=cs.SX.zeros(3),
         base_position=cs.SX(posture.base_position),
@@ -128,8 +128,3 @@ def knot_of(task: Task, posture: Posture, forces: cs.SX, thrust: cs.SX) -> Knot:
         thrust_rate=cs.SX.zeros(jets),
         throttle=cs.SX.zeros(jets),
     )
-
-
-def com_of(task: Task, posture: Posture) -> Array:
-    """Return the CoM of a posture in the world [m], (3,)."""
-    return np.array(task.robot.kindyn.CoM_position(base_transform(posture), posture.joint_positions)).ravel()

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import casadi as cs
 import numpy as np
 
-from multimodal_to.doctor.balance import LONG_LEVER, com_of, residual
+from multimodal_to.doctor.balance import LONG_LEVER, residual
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.search import search
 from multimodal_to.doctor.task import Task
@@ -88,7 +88,7 @@ def _nearest_height(task: Task, com: Vector3) -> float | None:
         objective=off,
         thrusts=np.zeros(len(task.robot.jets)),
     )
-    return None if found is None else float(com_of(task, found)[2])
+    return None if found is None else float(task.robot.com_at(found)[2])
 
 
 def hold(task: Task) -> Iterator[Symptom]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from multimodal_to.adam import centroidal
 from multimodal_to.adam.spatial import SX, Array
-from multimodal_to.doctor.balance import com_of, knot_of
+from multimodal_to.doctor.balance import knot_of
 from multimodal_to.doctor.task import Task
 from multimodal_to.models.robot import Posture
 from multimodal_to.ocp.knot import Knot
@@ -65,7 +65,7 @@ def search(
     }
     options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-6}}
     solver = cs.nlpsol("search", "ipopt", problem, options)
-    there = start.base_position + np.array(com) - com_of(task, start)
+    there = start.base_position + np.array(com) - task.robot.com_at(start)
     share = thrusts * min(robot.weight / max(thrusts.sum(), 1e-9), 1.0)
     answer = solver(
         x0=np.concatenate([there, start.joint_positions, share]),

@@ -209,6 +209,10 @@ class Robot(Value):
                 raise ModelError(unknown("jet", name, known))
         return replace(self, jets=tuple(known[name] for name in names))
 
+    def com_at(self, posture: Posture) -> Array:
+        """Return where the CoM is in a posture, in the world [m], (3,)."""
+        return np.array(self.kindyn.CoM_position(posture.base_transform, posture.joint_positions)).ravel()
+
     @checked
     def with_gravity(self, gravity: Sequence[float] | Array) -> Robot:
         """Return the robot under another gravity: three numbers in world axes [m/s²].

@@ -80,7 +80,7 @@ class State(Value):
 
     def com(self, robot: Robot) -> Array:
         """Return where the CoM is in the world [m], (3,)."""
-        return np.array(robot.kindyn.CoM_position(self.posture.base_transform, self.joint_positions)).ravel()
+        return robot.com_at(self.posture)
 
     def momentum(self, robot: Robot) -> tuple[Array, Array]:
         """Return the velocity of the CoM [m/s] and the angular momentum about it [kg m²/s], world axes, (3,) each."""

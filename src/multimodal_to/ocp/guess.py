@@ -25,6 +25,8 @@ PLACES_WEIGHT = 30.0
 _TILT_MAX = 0.6
 """How far the base may turn from home about each axis to stand on a slope [rad]."""
 
+_ALONG_GROUND = np.array([[1.0], [1.0], [0.0]])
+"""What takes the vertical part from positions side by side [1], (3, 1)."""
 LANDED = 0.3
 """Share of the horizon in which a motion from the air to the ground comes down [1]."""
 
@@ -68,7 +70,7 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
     base = Pose(quaternion.rotation_matrix(orientation), position)
     points = [forward_kinematics(tree, tree.frame(name), base, joints).translation for name in robot.contact_names]
     heights = [surface.distance(point) for point in points]
-    at_home = np.array(robot.kindyn.CoM_position(base_transform(home), home.joint_positions)).ravel()
+    at_home = robot.com_at(home)
     places = contact_positions(robot, home).reshape(-1, 3) - at_home
     moved = cs.vertcat(
         *((point - com - place)[:2] / robot.standing_height for point, place in zip(points, places, strict=True))
@@ -119,11 +121,6 @@ def contact_positions(robot: Robot, posture: Posture) -> Array:
     return np.concatenate(points) if points else np.zeros(0)
 
 
-def com_position(robot: Robot, posture: Posture) -> Array:
-    """Return the CoM of a posture in the world [m], (3,)."""
-    return np.array(robot.kindyn.CoM_position(base_transform(posture), posture.joint_positions)).ravel()
-
-
 def base_transform(posture: Posture) -> Array:
     """Return w_H_base of a posture, (4, 4)."""
     return posture.base_transform
@@ -150,7 +147,7 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     guess = np.zeros((layout.size, knots))
     view = layout.read(guess)
     view["com_position"][:] = start[:, None] + travelled
-    away = view["com_position"] - com_position(robot, standing)[:, None]  # of the posture from where it stands
+    away = view["com_position"] - robot.com_at(standing)[:, None]  # of the posture from where it stands
     view["base_position"][:] = standing.base_position[:, None] + away
     upright = robot.upright.base_quaternion_xyzw
     view["base_quaternion_xyzw"][:] = signed_like(standing.base_quaternion_xyzw, upright)[:, None]
@@ -160,7 +157,7 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     _set_jets(robot, scenario, view, flown)
     feet = [contact.foot for contact in robot.contacts]
     moved, shares = steps(feet, robot.gait, scenario, travelled) if scenario.guess_steps else _glide(feet, travelled)
-    moved = moved + away[:, :1] * np.array([[1.0], [1.0], [0.0]])
+    moved = moved + away[:, :1] * _ALONG_GROUND
     stands = contact_positions(robot, standing).reshape(-1, 3, 1)
     points = stands + moved
     points[:, 2] += _ground(scenario, points) - _ground(scenario, stands)
@@ -194,11 +191,15 @@ def hop(robot: Robot, scenario: Scenario, heights: Array) -> tuple[Array, Array]
     return rise, np.where(rise > 0.0, -gravity * times, 0.0)
 
 
+def _lands(scenario: Scenario) -> bool:
+    """Return whether a motion goes from the air to the ground."""
+    return scenario.start is not Start.STANDING and scenario.terminal is Terminal.STANDING
+
+
 def _progress(scenario: Scenario) -> Array:
     """Return which share of the way is behind the robot at every knot, (N + 1,); one that lands is there early."""
     share = np.linspace(0.0, 1.0, scenario.knots + 1)
-    lands = scenario.start is not Start.STANDING and scenario.terminal is Terminal.STANDING
-    return np.minimum(share / LANDED, 1.0) if lands else share
+    return np.minimum(share / LANDED, 1.0) if _lands(scenario) else share
 
 
 def _weight_flown(robot: Robot, scenario: Scenario) -> Array:
@@ -211,8 +212,7 @@ def _weight_flown(robot: Robot, scenario: Scenario) -> Array:
     if not robot.jets:
         return np.zeros_like(share)
     if scenario.start is not Start.STANDING:
-        lands = scenario.terminal is Terminal.STANDING
-        return np.minimum((1.0 - share) / (1.0 - LANDED), 1.0) if lands else np.ones_like(share)
+        return np.minimum((1.0 - share) / (1.0 - LANDED), 1.0) if _lands(scenario) else np.ones_like(share)
     return share if scenario.terminal is Terminal.HOVER and scenario.guess_steps else np.zeros_like(share)
 
 
@@ -235,6 +235,5 @@ def _set_jets(robot: Robot, scenario: Scenario, view: dict[str, Array], flown: A
 
 def _glide(feet: Sequence[str], travelled: Array) -> tuple[Array, Array]:
     """Return how far each contact point has moved along the ground, (contacts, 3, N + 1), and its share of the load."""
-    along_ground = travelled * np.array([[1.0], [1.0], [0.0]])
     count = len(feet)
-    return np.tile(along_ground, (count, 1, 1)), np.full((count, travelled.shape[1]), 1.0 / max(count, 1))
+    return np.tile(travelled * _ALONG_GROUND, (count, 1, 1)), np.full((count, travelled.shape[1]), 1.0 / max(count, 1))
