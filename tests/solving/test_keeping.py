@@ -6,9 +6,11 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 
+import casadi as cs
 import numpy as np
 import pytest
 
@@ -126,6 +128,37 @@ def test_ctrl_c_in_a_script_ends_the_solve_and_what_it_found_is_returned(problem
     assert stopped.status is mt.Status.STOPPED
     assert stopped.iterations < 30
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.usefixtures("ctrl_c")
+@pytest.mark.parametrize("delay", [0.2, 0.4, 0.7])
+def test_ctrl_c_within_a_factorisation_ends_the_solve_with_its_best_iterate(ironcub, delay):
+    """Most of this solve's time goes to factorisations, so that is where the signal comes."""
+    big = mt.build(ironcub, replace(mt.scenarios.paper("take-off"), knots=280, interval_min=0.025, interval_max=0.025))
+    timer = threading.Timer(delay, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    try:
+        stopped = mt.solve(big)
+    finally:
+        timer.join()
+    assert stopped.status is mt.Status.STOPPED
+    assert np.isfinite(stopped.objective)
+    assert stopped.trajectory.knots == 280
+
+
+@pytest.mark.parametrize("solver", ["auto", "mumps"])
+def test_rows_that_are_no_number_beyond_the_guess_leave_an_iterate_that_is(ironcub, capfd, solver):
+    def inside(knot, parameters):
+        """√(1e-8 − |hω|²): a number at the start guess, where nothing turns, and hardly anywhere else."""
+        return cs.sqrt(1e-8 - cs.sumsqr(knot.angular_momentum))
+
+    term = mt.Constraint(value=inside, within=mt.at_least(0.0), unit="kg m²/s", holds=mt.Where.LATER_KNOTS)
+    narrow = mt.build(ironcub, SCENARIO, mt.Formulation.paper().with_terms(term))
+    ended = mt.solve(narrow, mt.Ipopt(linear_solver=solver, max_iterations=40))
+    assert ended.status in (mt.Status.ITERATION_LIMIT, mt.Status.FAILED)
+    assert np.isfinite(ended.objective)
+    assert np.isfinite(narrow.rows_at(narrow.start_from(ended.trajectory))).all()
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_crash_in_the_middle_loses_nothing(problem, monkeypatch):

@@ -206,6 +206,7 @@ def _run(problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Wa
         "calc_lam_p": False,
         "record_time": True,
         "error_on_fail": False,
+        "show_eval_warnings": False,  # IPOPT takes a shorter step where a row is no number
         "jac_g": nlp.jacobian,
         "grad_f": nlp.gradient,
         "hess_lag": nlp.cost_hessian if watcher.which is Pass.ROUGH else nlp.hessian,

@@ -61,14 +61,19 @@ typedef struct {
   int size, variables, slacks, equalities; /* size = variables + 2 slacks + equalities */
   int knots;
   const int *knot;          /* of each variable; −1: a global one */
-  int triplets, *place;     /* of each triplet of IPOPT: its entry */
+  int triplets, *triplet_start, *triplet; /* of each entry: IPOPT's triplets that it is the sum of */
   int entries, *row, *column, *column_start; /* entries are numbered column by column */
+  int *column_inequalities; /* where those of a column begin that are of inequality rows; they are its last ones */
+  int middle;               /* the column that half of the entries are before */
   KktRows rows;             /* equality rows, then inequality rows: their variables */
   KktRows curvature;        /* of each variable: the variables, itself too, that it has an entry with */
   int *equality_diagonal;   /* entries, −1: none */
   int *row_diagonal, *slack_diagonal, *coupling; /* of each inequality row */
   int *home;                /* of each row, equality rows first: the front that its entries go to; −1: the root */
 } KktPattern;
+
+/* Where a share of a loop of so many turns begins. */
+static inline int kkt_share(int count, int share, int shares) { return (int)((long long)count * share / shares); }
 
 static inline int kkt_slack(const KktPattern *p, int row) { return p->variables + row; }
 static inline int kkt_equality(const KktPattern *p, int row) { return p->variables + p->slacks + row; }
@@ -179,6 +184,7 @@ typedef struct {
   double *determinant; /* of each inequality row's 2 × 2 block of s and y_d */
   double *rounding;    /* of each unknown: size of what was subtracted from its diagonal */
   double *solution;    /* 2 × size values for the solves */
+  double *multiplier;  /* of each inequality row, for the solves */
   double threshold;
   int from_end_first;  /* which half had too many negative eigenvalues the last time */
 } KktMatrix;

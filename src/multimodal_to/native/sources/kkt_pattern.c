@@ -3,15 +3,16 @@
 
 #include <string.h>
 
-/* Give each distinct place (row ≥ column) of the triplets a number, column by column. */
+/* Give each distinct place (row ≥ column) of the triplets a number, column by column, inequality rows last in each. */
 static void number_entries(KktArena *arena, KktPattern *p, const int *irn, const int *jcn) {
   size_t n = (size_t)p->size, triplets = (size_t)p->triplets;
   int *start = kkt_take(arena, n + 1, sizeof(int)), *next = kkt_take(arena, n, sizeof(int));
   int *order = kkt_take(arena, triplets, sizeof(int)), *number = kkt_take(arena, n, sizeof(int));
-  p->place = kkt_take(arena, triplets, sizeof(int));
+  int *place = kkt_take(arena, triplets, sizeof(int));
   p->row = kkt_take(arena, triplets, sizeof(int));
   p->column = kkt_take(arena, triplets, sizeof(int));
   p->column_start = kkt_take(arena, n + 1, sizeof(int));
+  p->column_inequalities = kkt_take(arena, n + 1, sizeof(int));
   for (int t = 0; t < p->triplets; t++) start[irn[t] < jcn[t] ? irn[t] : jcn[t]]++; /* they count from one */
   for (int i = 0; i < p->size; i++) start[i + 1] += start[i];
   memcpy(next, start, sizeof(int) * n);
@@ -20,17 +21,27 @@ static void number_entries(KktArena *arena, KktPattern *p, const int *irn, const
   p->entries = 0;
   for (int column = 0; column < p->size; column++) {
     int first = p->column_start[column] = p->entries;
-    for (int q = start[column]; q < start[column + 1]; q++) {
-      int t = order[q], row = (irn[t] > jcn[t] ? irn[t] : jcn[t]) - 1;
-      if (number[row] < first) {
-        number[row] = p->entries;
-        p->row[p->entries] = row;
-        p->column[p->entries++] = column;
+    for (int last = 0; last < 2; last++) {
+      if (last) p->column_inequalities[column] = p->entries;
+      for (int q = start[column]; q < start[column + 1]; q++) {
+        int t = order[q], row = (irn[t] > jcn[t] ? irn[t] : jcn[t]) - 1;
+        if ((row >= kkt_inequality(p, 0)) != last) continue;
+        if (number[row] < first) {
+          number[row] = p->entries;
+          p->row[p->entries] = row;
+          p->column[p->entries++] = column;
+        }
+        place[t] = number[row];
       }
-      p->place[t] = number[row];
     }
   }
   p->column_start[p->size] = p->entries;
+  for (p->middle = 0; p->column_start[p->middle] < p->entries / 2;) p->middle++;
+  p->triplet_start = kkt_take(arena, (size_t)p->entries + 2, sizeof(int));
+  p->triplet = kkt_take(arena, triplets, sizeof(int));
+  for (int t = 0; t < p->triplets; t++) p->triplet_start[place[t] + 2]++;
+  for (int e = 0; e < p->entries; e++) p->triplet_start[e + 2] += p->triplet_start[e + 1];
+  for (int t = 0; t < p->triplets; t++) p->triplet[p->triplet_start[place[t] + 1]++] = t;
 }
 
 enum { VARIABLE, SLACK, EQUALITY, INEQUALITY };

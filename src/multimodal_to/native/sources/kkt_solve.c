@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+enum { SHARES = 8 }; /* of loops that threads share */
 
 typedef struct {
   const KktMatrix *matrix;
@@ -155,18 +156,62 @@ static void subtract_row(const KktMatrix *matrix, int row, double factor, double
   for (int q = rows->start[row]; q < rows->start[row + 1]; q++) from[rows->column[q]] -= matrix->value[rows->entry[q]] * factor;
 }
 
+/* The column of a variable in the inequality rows, times their multipliers. */
+static double column_times(const KktMatrix *matrix, int variable, const double *multiplier) {
+  const KktPattern *p = matrix->pattern;
+  const double *of_row = multiplier - kkt_inequality(p, 0);
+  double sum = 0;
+  for (int e = p->column_inequalities[variable]; e < p->column_start[variable + 1]; e++) sum += matrix->value[e] * of_row[p->row[e]];
+  return sum;
+}
+
+/* What a part of the condensed rows, or of the variables, needs; parts do not meet. */
+typedef struct {
+  KktMatrix *matrix;
+  const KktPlan *plan;
+  const double *rhs;
+  double *x, *other;
+} Condensed;
+
+static void find_multipliers(void *context, int share) {
+  const Condensed *c = context;
+  const KktPattern *p = c->matrix->pattern;
+  for (int i = kkt_share(p->slacks, share, SHARES); i < kkt_share(p->slacks, share + 1, SHARES); i++) {
+    double left = c->rhs[kkt_inequality(p, i)];
+    if (c->plan->row_meets[i]) left -= row_times(c->matrix, p->equalities + i, c->other);
+    c->matrix->multiplier[i] = multiplier(c->matrix, i, c->rhs[kkt_slack(p, i)], left);
+  }
+}
+
+static void subtract_rows(void *context, int share) {
+  const Condensed *c = context;
+  const KktPattern *p = c->matrix->pattern;
+  for (int j = kkt_share(p->variables, share, SHARES); j < kkt_share(p->variables, share + 1, SHARES); j++)
+    c->x[j] -= column_times(c->matrix, j, c->matrix->multiplier);
+}
+
+static void complete_rows(void *context, int share) {
+  const Condensed *c = context;
+  const KktPattern *p = c->matrix->pattern;
+  for (int i = kkt_share(p->slacks, share, SHARES); i < kkt_share(p->slacks, share + 1, SHARES); i++) {
+    int s = kkt_slack(p, i), y = kkt_inequality(p, i);
+    double delta = p->row_diagonal[i] < 0 ? 0 : c->matrix->value[p->row_diagonal[i]], e = c->matrix->value[p->coupling[i]];
+    double rest = c->rhs[y] - row_times(c->matrix, p->equalities + i, c->x);
+    c->x[y] = multiplier(c->matrix, i, c->rhs[s], rest);
+    c->x[s] = (delta * c->rhs[s] - e * rest) / c->matrix->determinant[i];
+  }
+}
+
 /* r ← the right-hand side once slacks, inequality rows and defined variables are gone; start: these at x = 0. */
-static void reduce(const KktMatrix *matrix, const KktPlan *plan, const double *rhs, double *r, double *start) {
+static void reduce(KktMatrix *matrix, const KktPlan *plan, const double *rhs, double *r, double *start) {
   const KktPattern *p = matrix->pattern;
   const KktDefinitions *d = &plan->definitions;
+  Condensed condensed = {.matrix = matrix, .plan = plan, .rhs = rhs, .x = r, .other = start};
   memcpy(r, rhs, sizeof(double) * (size_t)p->size);
   memset(start, 0, sizeof(double) * (size_t)p->variables);
   for (int i = 0; i < d->count; i++) start[d->variable[i]] = rhs[kkt_equality(p, d->row[i])] / matrix->value[d->entry[i]];
-  for (int i = 0; i < p->slacks; i++) {
-    double left = rhs[kkt_inequality(p, i)];
-    if (plan->row_meets[i]) left -= row_times(matrix, p->equalities + i, start);
-    subtract_row(matrix, p->equalities + i, multiplier(matrix, i, rhs[kkt_slack(p, i)], left), r);
-  }
+  mt_parallel(SHARES, find_multipliers, &condensed);
+  mt_parallel(SHARES, subtract_rows, &condensed);
   for (int i = 0; i < d->count; i++)
     for (int q = plan->meets.start[i]; q < plan->meets.start[i + 1]; q++)
       r[plan->meets.column[q]] -= matrix->value[plan->meets.entry[q]] * start[d->variable[i]];
@@ -177,25 +222,18 @@ static void reduce(const KktMatrix *matrix, const KktPlan *plan, const double *r
 }
 
 /* Fill in what `reduce` took out. */
-static void complete(const KktMatrix *matrix, const KktPlan *plan, const double *rhs, double *x, double *left) {
+static void complete(KktMatrix *matrix, const KktPlan *plan, const double *rhs, double *x) {
   const KktPattern *p = matrix->pattern;
   const KktDefinitions *d = &plan->definitions;
+  Condensed condensed = {.matrix = matrix, .plan = plan, .rhs = rhs, .x = x};
   for (int i = 0; i < d->count; i++) x[d->variable[i]] = 0;
   for (int i = 0; i < d->count; i++) {
     double rest = rhs[kkt_equality(p, d->row[i])] - row_times(matrix, d->row[i], x);
     x[d->variable[i]] = rest / matrix->value[d->entry[i]];
   }
-  memset(left, 0, sizeof(double) * (size_t)p->variables);
-  for (int i = 0; i < p->slacks; i++) {
-    int s = kkt_slack(p, i), y = kkt_inequality(p, i);
-    double delta = p->row_diagonal[i] < 0 ? 0 : matrix->value[p->row_diagonal[i]], e = matrix->value[p->coupling[i]];
-    double rest = rhs[y] - row_times(matrix, p->equalities + i, x);
-    x[y] = multiplier(matrix, i, rhs[s], rest);
-    x[s] = (delta * rhs[s] - e * rest) / matrix->determinant[i];
-    if (plan->row_meets[i]) subtract_row(matrix, p->equalities + i, x[y], left);
-  }
+  mt_parallel(SHARES, complete_rows, &condensed);
   for (int i = 0; i < d->count; i++) {
-    double rest = rhs[d->variable[i]] + left[d->variable[i]];
+    double rest = rhs[d->variable[i]] - column_times(matrix, d->variable[i], x + kkt_inequality(p, 0));
     for (int q = plan->meets.start[i]; q < plan->meets.start[i + 1]; q++)
       rest -= matrix->value[plan->meets.entry[q]] * x[plan->meets.column[q]];
     x[kkt_equality(p, d->row[i])] = rest / matrix->value[d->entry[i]];
@@ -207,15 +245,22 @@ void kkt_solve(KktMatrix *matrix, const KktPlan *plan, double *rhs) {
   double *x = matrix->solution, *other = x + n;
   reduce(matrix, plan, rhs, x, other);
   solve_fronts(matrix, plan, x, other);
-  complete(matrix, plan, rhs, x, other);
+  complete(matrix, plan, rhs, x);
   memcpy(rhs, x, sizeof(double) * n);
 }
 
-void kkt_residual(const KktMatrix *matrix, const double *rhs, const double *x, double *residual) {
-  const KktPattern *p = matrix->pattern;
-  const double *value = matrix->value;
-  memcpy(residual, rhs, sizeof(double) * (size_t)p->size);
-  for (int j = 0; j < p->size; j++) {
+typedef struct {
+  const KktMatrix *matrix;
+  const double *x;
+  double *residual[2];
+} Residual;
+
+static void subtract_columns(void *context, int half) {
+  const Residual *r = context;
+  const KktPattern *p = r->matrix->pattern;
+  const double *value = r->matrix->value, *x = r->x;
+  double *residual = r->residual[half];
+  for (int j = half ? p->middle : 0; j < (half ? p->size : p->middle); j++) {
     double sum = 0, of_column = x[j];
     for (int e = p->column_start[j]; e < p->column_start[j + 1]; e++) {
       int i = p->row[e];
@@ -224,4 +269,14 @@ void kkt_residual(const KktMatrix *matrix, const double *rhs, const double *x, d
     }
     residual[j] -= sum;
   }
+}
+
+void kkt_residual(const KktMatrix *matrix, const double *rhs, const double *x, double *residual) {
+  size_t n = (size_t)matrix->pattern->size;
+  double *second = matrix->solution;
+  Residual halves = {.matrix = matrix, .x = x, .residual = {residual, second}};
+  memcpy(residual, rhs, sizeof(double) * n);
+  memset(second, 0, sizeof(double) * n);
+  mt_parallel(2, subtract_columns, &halves);
+  for (size_t i = 0; i < n; i++) residual[i] += second[i];
 }

@@ -1,5 +1,6 @@
 /* A linear solver for the KKT matrices of one problem. */
 #include "kkt_solver.h"
+#include "parallel.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -10,7 +11,7 @@
 #define PIVOT_SAFER 1e-5      /* where solves were poor */
 #define RESIDUAL_REACH 1e-10  /* |K x − b| / |b| that ends refinement */
 #define RESIDUAL_POOR 1e-6    /* |K x − b| / (|x| + |b|) that asks for another factorisation */
-enum { REFINEMENTS_MOST = 3, LARGEST_FRONT = 2000 };
+enum { REFINEMENTS_MOST = 3, LARGEST_FRONT = 2000, SHARES = 8 };
 #define OPERATIONS_MOST 2e11
 
 struct Kkt {
@@ -105,6 +106,7 @@ static const char *read_structure(Kkt *kkt, int triplets, const int *irn, const 
     .pattern = p, .threshold = PIVOT_LEAST,
     .value = numbers(arena, p->entries), .determinant = numbers(arena, p->slacks),
     .rounding = numbers(arena, p->size), .solution = numbers(arena, 2 * p->size),
+    .multiplier = numbers(arena, p->slacks),
   };
   kkt->right_side = numbers(arena, p->size);
   kkt->residual = numbers(arena, p->size);
@@ -173,16 +175,32 @@ static int factorise(Kkt *kkt, int without, int break_off) {
   return kkt->outcome.status;
 }
 
+typedef struct {
+  const KktMatrix *matrix;
+  const double *values; /* of IPOPT's triplets */
+  double nothing[SHARES];
+} Taking;
+
+static void take_share(void *context, int share) {
+  Taking *taking = context;
+  const KktPattern *p = taking->matrix->pattern;
+  double nothing = 0; /* 0 · v is 0 of finite numbers only */
+  for (int e = kkt_share(p->entries, share, SHARES); e < kkt_share(p->entries, share + 1, SHARES); e++) {
+    double sum = 0;
+    for (int q = p->triplet_start[e]; q < p->triplet_start[e + 1]; q++) sum += taking->values[p->triplet[q]];
+    taking->matrix->value[e] = sum;
+    nothing += 0 * sum;
+  }
+  taking->nothing[share] = nothing;
+}
+
 int kkt_take_values(Kkt *kkt, const double *values, int *negative) {
   const KktPattern *p = &kkt->pattern;
-  double started = now();
+  double started = now(), nothing = 0;
   if (!kkt->irn) return KKT_SINGULAR; /* no structure was taken */
-  memset(kkt->matrix.value, 0, sizeof(double) * (size_t)p->entries);
-  double nothing = 0; /* 0 · v is 0 of finite numbers only */
-  for (int t = 0; t < p->triplets; t++) {
-    kkt->matrix.value[p->place[t]] += values[t];
-    nothing += 0 * values[t];
-  }
+  Taking taking = {.matrix = &kkt->matrix, .values = values};
+  mt_parallel(SHARES, take_share, &taking);
+  for (int share = 0; share < SHARES; share++) nothing += taking.nothing[share];
   kkt->matrix.threshold = PIVOT_LEAST;
   kkt->current = NULL;
   int status = nothing == 0 ? factorise(kkt, 0, 1) : KKT_NO_NUMBER;
