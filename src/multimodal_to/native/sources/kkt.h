@@ -6,7 +6,7 @@
  *     [ J_d    −1             −δ_c       ] y_d      y_d: multipliers of the inequality rows
  *
  * The order of the unknowns is IPOPT's. A row couples variables of neighbouring knots, and global ones.
- *   1. s and y_d are condensed: a row of weight 1 / (1/Σ_s + δ_c) is added to W.                  kkt_condense.c
+ *   1. s and y_d are condensed: a row of weight 1 / (1/Σ_s + δ_c) is added to W.                  kkt_factor.c
  *   2. A row that defines a variable, v = −Σ z_j x_j, is eliminated with it by substitution,
  *      Zᵀ K Z, where that couples no knots that were not coupled.                                kkt_plan.c
  *   3. What is left is factorised as L D Lᵀ in dense fronts, one for each knot, from both ends of
