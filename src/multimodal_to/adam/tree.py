@@ -9,6 +9,7 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import Array, Inertia
+from multimodal_to.arguments import checked
 from multimodal_to.errors import ModelError, unknown
 from multimodal_to.values import Value
 
@@ -123,6 +124,7 @@ class Tree(Value):
             coupling[row, body.column] = body.multiplier
         return coupling
 
+    @checked
     def joint_values(self, s: Array) -> dict[str, Array]:
         """Return where every joint of the URDF that can move is: those of s, their followers, and the locked ones.
 
@@ -133,6 +135,7 @@ class Tree(Value):
         values |= {name: how.multiplier * values[how.joint] + how.offset for name, how in self.followers.items()}
         return values | {name: np.full(s.shape[1:], value) for name, value in self.locked.items()}
 
+    @checked
     def joint_rates(self, s_dot: Array) -> dict[str, Array]:
         """Return how fast every joint of the URDF that can move does, as `joint_values` says where it is.
 
@@ -143,6 +146,7 @@ class Tree(Value):
         rates |= {name: how.multiplier * rates[how.joint] for name, how in self.followers.items()}
         return rates | {name: np.zeros(s_dot.shape[1:]) for name in self.locked}
 
+    @checked
     def frame(self, name: str) -> Frame:
         """Return a frame by name.
 
@@ -153,6 +157,7 @@ class Tree(Value):
             raise ModelError(unknown("frame", name, self.frames))
         return self.frames[name]
 
+    @checked
     def path(self, body: int) -> list[int]:
         """Return the bodies from the base's child down to `body`; empty for the base itself."""
         chain: list[int] = []

@@ -16,6 +16,7 @@ from lxml import etree
 from multimodal_to.adam.lean_tree import build_tree, independent
 from multimodal_to.adam.leftovers import refuse_leftovers, unread
 from multimodal_to.adam.tree import Joint, Link, Mimic, Tree
+from multimodal_to.arguments import checked
 from multimodal_to.errors import ModelError, listed, said, shortened
 from multimodal_to.files.numbers import numbers
 from multimodal_to.files.reading import read_bytes
@@ -40,6 +41,7 @@ _UNIT = 1e-6
 """An axis whose length differs from 1 by less than this was meant as a unit one."""
 
 
+@checked
 def load_tree(
     urdf: str | os.PathLike[str],
     joint_names: Sequence[str] | None = None,

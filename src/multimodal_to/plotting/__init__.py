@@ -1,6 +1,7 @@
 """Figures of one or several `Trajectory`s, which the caller shows or saves: nothing is shown here."""
 
 # isort: off
+from multimodal_to.arguments import checked
 from multimodal_to.plotting import backend  # noqa: F401  # before all that imports matplotlib
 
 # isort: on
@@ -53,6 +54,7 @@ FIGURES: Mapping[str, _Plot] = FrozenMapping(
 """The figures by name."""
 
 
+@checked
 def plot(name: str, robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Return a figure by its name in `FIGURES`.
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.models.joint_units import joint_units, slides
 from multimodal_to.models.robot import Robot
 from multimodal_to.plotting.style import (
@@ -30,6 +31,7 @@ _COLUMNS = 6
 _CELL = (2.15, 1.55)  # [inch]
 
 
+@checked
 def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Plot every joint's position [rad or m] over its whole range, which dashed lines end, and the speeds by group.
 
@@ -58,6 +60,7 @@ def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
     return figure
 
 
+@checked
 def plot_torques(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Plot every joint's torque [N m], or force [N], and, dashed, its effort limit (`derived.joint_torques`).
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from multimodal_to.arguments import checked
 from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.auditing.findings import Finding
 from multimodal_to.models.robot import Robot
@@ -33,6 +34,7 @@ _FLOOR, _PRODUCT_FLOOR = 1e-6, 1e-8  # of what is drawn on the logarithmic axes
 _FAILED = "#d62728"
 
 
+@checked
 def plot_margins(
     robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None, audits: Sequence[Audit] | None = None
 ) -> Figure:

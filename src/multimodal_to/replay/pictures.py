@@ -11,6 +11,7 @@ import numpy as np
 from PIL import Image
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, OutputError
 from multimodal_to.files.writing import scratch, whole
 from multimodal_to.models.robot import Robot
@@ -29,6 +30,7 @@ _COLOURS = 128  # of a GIF
 _ROOM = 0.35  # between ghosts that stand where they were [m]
 
 
+@checked
 def write_gif(
     robot: Robot,
     trajectory: Trajectory,
@@ -68,6 +70,7 @@ def write_gif(
     return Path(path)
 
 
+@checked
 def write_mp4(
     robot: Robot,
     trajectory: Trajectory,
@@ -123,6 +126,7 @@ def write_mp4(
     return Path(path)
 
 
+@checked
 def write_snapshots(
     robot: Robot,
     trajectory: Trajectory,
@@ -158,6 +162,7 @@ def write_snapshots(
     return Path(path)
 
 
+@checked
 def snapshot_times(robot: Robot, trajectory: Trajectory) -> Array:
     """Return times [s] that tell a motion: start and end, and those where flight begins or ends, or even ones.
 

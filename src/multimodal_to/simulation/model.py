@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from multimodal_to.adam.spatial import Array, Inertia
 from multimodal_to.adam.tree import Joint, Link, Tree
 from multimodal_to.adam.urdf import read_urdf
+from multimodal_to.arguments import checked
 from multimodal_to.errors import ModelError, OutputError, listed, said
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Plane, Surface, frame_function, heights_below
@@ -74,6 +75,7 @@ class SimulationModel:
     jets: NDArray[np.int64]  # site of each jet, (jets,)
     notes: tuple[str, ...]  # what differs from the URDF, a sentence each
 
+    @checked
     def set_state(
         self,
         data: Any,
@@ -106,6 +108,7 @@ class SimulationModel:
         return {name: values[name] for name in (*tree.joint_names, *tree.followers)}
 
 
+@checked
 def build_model(
     robot: Robot,
     surface: Surface | None = None,

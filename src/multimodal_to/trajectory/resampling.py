@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError
 from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.quantities import QUANTITIES
 from multimodal_to.trajectory.trajectory import Trajectory
 
 
-def resample(trajectory: Trajectory, times: Array) -> Trajectory:
+@checked
+def resample(trajectory: Trajectory, times: Sequence[float] | Array) -> Trajectory:
     """Return the trajectory at other times [s], on its grid or between: linear, and the shortest turn of the base.
 
     Between the instants of two columns, at the share a of the time between them, a quantity is (1 − a) y_k + a y_k+1,
@@ -31,6 +34,7 @@ def resample(trajectory: Trajectory, times: Array) -> Trajectory:
     return replace(trajectory, time=wanted, rule=rule, **arrays)
 
 
+@checked
 def regrid(trajectory: Trajectory, knots: int, rule: str) -> Trajectory:
     """Return the trajectory on equal intervals, with every quantity at the instant that a rule wants.
 
@@ -44,6 +48,7 @@ def regrid(trajectory: Trajectory, knots: int, rule: str) -> Trajectory:
     return replace(trajectory, time=grid, rule=rule, **arrays)
 
 
+@checked
 def at_times(trajectory: Trajectory, name: str, times: Array) -> Array:
     """Return a quantity at times [s]; before its first instant and after its last it is what it is there.
 
