@@ -15,6 +15,7 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.plotting.contacts import plot_contacts
 from multimodal_to.plotting.forces import plot_forces
 from multimodal_to.plotting.joints import plot_joints, plot_torques
+from multimodal_to.plotting.lettering import LetterWarning
 from multimodal_to.plotting.margins import plot_margins
 from multimodal_to.plotting.motion import plot_com, plot_momentum
 from multimodal_to.plotting.style import SUFFIXES, save
@@ -24,6 +25,7 @@ from multimodal_to.values import FrozenMapping
 __all__ = [
     "FIGURES",
     "SUFFIXES",
+    "LetterWarning",
     "plot",
     "plot_com",
     "plot_contacts",

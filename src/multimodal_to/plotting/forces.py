@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
+from multimodal_to.plotting.lettering import lettered
 from multimodal_to.plotting.style import (
     COLOURS,
     Run,
@@ -58,7 +59,7 @@ def plot_forces(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
     for axes in panels:
         legend_above(axes)
     figure.align_ylabels()
-    return figure
+    return lettered(figure)
 
 
 def _draw_vertical(axes: Axes, runs: Sequence[Run]) -> None:

@@ -12,6 +12,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
 from multimodal_to.models.joint_units import joint_units, slides
 from multimodal_to.models.robot import Robot
+from multimodal_to.plotting.lettering import lettered
 from multimodal_to.plotting.style import (
     SMALL,
     Run,
@@ -57,7 +58,7 @@ def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
         whole_range=True,
     )
     _speeds(lower, robot, runs)
-    return figure
+    return lettered(figure)
 
 
 @checked
@@ -75,7 +76,7 @@ def plot_torques(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] 
     effort = robot.joint_limits.effort
     values = [blank(joint_torques(run.robot, run.trajectory), run.trajectory) for run in runs]
     _cells(figure, runs, values, "joint_positions", _effort_title(robot), "N m", -effort, effort, whole_range=False)
-    return figure
+    return lettered(figure)
 
 
 def _cells(

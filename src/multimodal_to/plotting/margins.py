@@ -14,6 +14,7 @@ from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.auditing.findings import Finding
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
+from multimodal_to.plotting.lettering import lettered
 from multimodal_to.plotting.style import (
     COLOURS,
     LIMIT,
@@ -60,7 +61,7 @@ def plot_margins(
     products, properties = figure.subplots(2, 1, height_ratios=[2.2, count * 0.19])
     _draw_products(products, runs)
     _draw_findings(properties, runs, reports)
-    return figure
+    return lettered(figure)
 
 
 def _draw_products(axes: Axes, runs: Sequence[Run]) -> None:

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
+from multimodal_to.plotting.lettering import lettered
 from multimodal_to.plotting.style import Run, draw_flight, draw_lines, finish, legend_above, new_figure, runs_of
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 
@@ -58,4 +59,4 @@ def _components(runs: Sequence[Run], what: str, columns: Sequence[tuple[str, str
         grid[2, column].set_xlabel("time [s]")
     legend_above(grid[0, 0])
     figure.align_ylabels()
-    return figure
+    return lettered(figure)
