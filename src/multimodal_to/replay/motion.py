@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -18,7 +19,7 @@ from multimodal_to.replay.ghost import draw_ghost, in_step
 from multimodal_to.replay.scene import Scene, meshcat
 from multimodal_to.replay.stage import View, draw_stage
 from multimodal_to.replay.visuals import Appearance, Visual
-from multimodal_to.scenarios.data import stored
+from multimodal_to.scenarios.data import OwnSurfaceError, stored
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 from multimodal_to.trajectory.derived import frame_poses
 from multimodal_to.trajectory.resampling import resample
@@ -35,6 +36,10 @@ _STILL_ZOOM = 4.0  # from farther off, so that ghosts look alike
 _CLOCK = 0.01  # what the clock of a page shows [s]: a time so near to start or end means it
 _GAP = 0.25  # between the ghosts of a motion that stays in its place, per width of the robot
 _FAINTEST = 0.45  # opacity of the first of the ghosts that may overlap
+
+
+class GroundWarning(UserWarning):
+    """The ground of a motion is not known."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,8 +161,15 @@ def draw_still(
 
 
 def surface_of(trajectory: Trajectory) -> Surface:
-    """Return the ground of the scenario that the trajectory keeps; flat where it keeps none."""
-    scenario = stored(trajectory)
+    """Return the ground of the scenario that the trajectory keeps; flat where it keeps none.
+
+    It is flat as well where the ground is of a class of one's own, and a `GroundWarning` says so.
+    """
+    try:
+        scenario = stored(trajectory)
+    except OwnSurfaceError as error:
+        warnings.warn(f"drawn on flat ground: {str(error).partition(';')[0]}", GroundWarning, stacklevel=2)
+        return FlatGround()
     return FlatGround() if scenario is None else scenario.surface
 
 
