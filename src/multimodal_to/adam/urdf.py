@@ -141,6 +141,7 @@ def _root(urdf: str | os.PathLike[str]) -> tuple[Any, str]:
         raise ModelError(f"{source} is not valid XML: {said(error)}") from error
     if root.getroottree().docinfo.internalDTD is not None:
         raise ModelError(f"{source} {_ENTITIES}")
+    _drop_namespace(root)
     if root.tag != "robot":
         raise ModelError(f"{source} is no URDF: its root element is <{root.tag}>, expected <robot>")
     if (count := sum(1 for _ in root.iter())) > MOST_ELEMENTS:
@@ -149,6 +150,15 @@ def _root(urdf: str | os.PathLike[str]) -> tuple[Any, str]:
         root.set("name", "robot")
     refuse_leftovers(root, source)
     return root, source
+
+
+def _drop_namespace(root: Any) -> None:
+    """Take a namespace that the whole file stands in off its elements; that of xacro stays."""
+    space = etree.QName(root).namespace
+    if space and "xacro" not in space and root.prefix is None:
+        for element in root.iter(f"{{{space}}}*"):
+            element.tag = etree.QName(element).localname
+        etree.cleanup_namespaces(root)
 
 
 def _read(urdf: str | os.PathLike[str]) -> tuple[bytes, str]:
