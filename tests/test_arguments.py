@@ -131,5 +131,6 @@ def test_a_public_function_refuses_what_is_no_argument_of_it(name):
         if wrong is not None and (name, key) not in ANY:
             with pytest.raises(InputError):
                 check(key, wrong, hints[key])
-    with pytest.raises(InputError, match=f"^{function.__name__}: '.*' is <object object at .*>; expected "):
+    said = name.removesuffix(".__init__").rpartition(".")[2]
+    with pytest.raises(InputError, match=f"^{said}: '.*' is <object object at .*>; expected "):
         function(*given, **named)

@@ -36,6 +36,7 @@ def checked(function: Function) -> Function:
         InputError: an argument is not what its annotation says.
     """
     signature = inspect.signature(function)
+    said = function.__qualname__.split(".")[-2 if function.__name__ == "__init__" else -1]
 
     @wraps(function)
     def checking(*given: Any, **named: Any) -> Any:
@@ -44,7 +45,7 @@ def checked(function: Function) -> Function:
             kind = signature.parameters[name].kind
             values = value if kind is inspect.Parameter.VAR_POSITIONAL else (value,)
             for one in values:
-                check(f"{function.__name__}: '{name}'", one, hints.get(name, Any))
+                check(f"{said}: '{name}'", one, hints.get(name, Any))
         return function(*given, **named)
 
     return cast(Function, checking)

@@ -165,7 +165,12 @@ def _read(urdf: str | os.PathLike[str]) -> tuple[bytes, str]:
     if isinstance(urdf, str) and (written := urdf.lstrip(_BLANK)).startswith("<"):
         if len(urdf) > LARGEST_URDF:
             raise ModelError(f"the URDF text is longer than {LARGEST_URDF / 1e6:g} MB, the most that is read")
-        return written.rstrip().encode("utf-8", errors="replace"), _TEXT
+        try:
+            return written.rstrip().encode("utf-8"), _TEXT
+        except UnicodeEncodeError as error:
+            raise ModelError(f"{_TEXT} holds {error.object[error.start]!a}, which is no character") from error
+    if isinstance(urdf, str) and not urdf.strip(_BLANK):
+        raise ModelError(f"{_TEXT} is empty; expected a path, or the XML itself")
     return read_bytes(urdf, LARGEST_URDF, ModelError), f"'{Path(urdf)}'"
 
 
