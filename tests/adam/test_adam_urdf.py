@@ -525,7 +525,7 @@ def test_numbers_that_are_none_are_named_by_file_element_and_attribute(
 
 def test_a_text_that_is_none_or_holds_what_is_no_character_says_so():
     for empty in ("", " \n\t", "\ufeff"):
-        with pytest.raises(ModelError, match="^the URDF text is empty; expected a path, or the XML itself$"):
+        with pytest.raises(ModelError, match=r"^the URDF text is empty; expected a path, or the XML itself$"):
             load_tree(empty)
-    with pytest.raises(ModelError, match="udc80', which is no character$"):
+    with pytest.raises(ModelError, match=r"udc80', which is no character$"):
         load_tree(robot(link("a\udc80")))
