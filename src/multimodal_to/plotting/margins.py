@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from multimodal_to.arguments import checked
 from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.auditing.findings import Finding
+from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.plotting.lettering import lettered
@@ -56,6 +57,8 @@ def plot_margins(
     """
     runs = runs_of(robot, trajectories, labels)
     reports = list(audits) if audits is not None else [audit(run.robot, run.trajectory) for run in runs]
+    if len(reports) != len(runs):
+        raise InputError(f"there are {len(runs)} trajectories and {len(reports)} audits; expected one for each")
     count = len(_properties(reports))
     figure = new_figure(runs, "complementarity and audit", (8.0, 3.6 + count * (0.19 + 0.06 * (len(runs) - 1))))
     products, properties = figure.subplots(2, 1, height_ratios=[2.2, count * 0.19])

@@ -23,6 +23,7 @@ from multimodal_to.scenarios.data import OwnSurfaceError, stored
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 from multimodal_to.trajectory.derived import frame_poses
 from multimodal_to.trajectory.resampling import resample
+from multimodal_to.trajectory.sameness import refuse_other_robot
 
 FOLLOW_FROM = 0.6
 """The camera follows the CoM along the ground in motions that go farther than this [m]."""
@@ -75,6 +76,7 @@ def draw_motion(
         ghost: another motion of the same robot, drawn faint in the same scene; it begins when this one does.
         live: draw for meshcat's own page.
     """
+    refuse_other_robot(trajectory, robot)
     scene = Scene(visualizer=visualizer, time=trajectory.time - trajectory.time[0])
     com = trajectory.com_position.T * [1.0, 1.0, 0.0]
     span = np.ptp(com, axis=0)
@@ -125,6 +127,9 @@ def draw_still(
     Raises:
         InputError: a time is not within the trajectory, or times do not increase.
     """
+    refuse_other_robot(trajectory, robot)
+    if not 0.0 < aspect < np.inf:
+        raise InputError(f"the picture's width over height is {aspect}; expected a positive number")
     instants = np.asarray(times, dtype=float)
     ends = np.clip(instants, trajectory.time[0], trajectory.time[-1])
     instants = np.where(np.abs(instants - ends) < _CLOCK, ends, instants)

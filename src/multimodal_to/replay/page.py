@@ -12,10 +12,8 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-import numpy as np
-
 from multimodal_to.adam.spatial import Array
-from multimodal_to.arguments import checked
+from multimodal_to.arguments import checked, vector
 from multimodal_to.files.writing import write_text
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.ghost import GHOST_COLOUR
@@ -97,7 +95,14 @@ def write_still_html(
         OutputError: the folder does not exist or cannot be written.
     """
     recorder, look = Recorder(), appearance(robot.urdf, meshes=meshes)
-    picture = draw_still(meshcat.Visualizer(window=recorder), robot, trajectory, np.asarray(times), look, aspect)
+    picture = draw_still(
+        meshcat.Visualizer(window=recorder),
+        robot,
+        trajectory,
+        vector("the times of the snapshots", times, None),
+        look,
+        aspect,
+    )
     return write_text(path, _page(trajectory, _player(robot, trajectory, recorder, picture, look.attribution)))
 
 

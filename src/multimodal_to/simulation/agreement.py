@@ -9,6 +9,7 @@ import numpy as np
 from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
+from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.simulation.model import SimulationModel, build_model, mujoco_module
 from multimodal_to.trajectory import Trajectory
@@ -33,7 +34,12 @@ def random_states(robot: Robot, count: int, seed: int = 0) -> States:
         robot: whose range of joints.
         count: how many.
         seed: of the random numbers; the same seed gives the same states.
+
+    Raises:
+        InputError: there is to be no state, or the seed is negative.
     """
+    if count < 1 or seed < 0:
+        raise InputError(f"{count} states of seed {seed}; expected at least one state and no negative seed")
     rng = np.random.default_rng(seed)
     limits, size = robot.joint_limits, 6 + len(robot.joint_names)
     turns = rng.normal(size=(4, count))

@@ -13,6 +13,7 @@ import numpy as np
 from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import Array, homogeneous
 from multimodal_to.arguments import checked
+from multimodal_to.errors import InputError, unknown
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import Surface, frame_function
 from multimodal_to.trajectory import rules
@@ -292,7 +293,12 @@ def at_knots(trajectory: Trajectory, name: str) -> Array:
     Where a quantity is in the middles of intervals, two of these meet at a knot, and it is the mean of theirs; an
     acceleration is that between them. After the last knot there is no interval: there it is that of the last one, and
     an acceleration is zero.
+
+    Raises:
+        InputError: there is no such quantity.
     """
+    if name not in QUANTITIES:
+        raise InputError(unknown("quantity", name, QUANTITIES))
     values: Array = getattr(trajectory, name)
     before = rules.instant(trajectory.rule, name)
     if not before:
