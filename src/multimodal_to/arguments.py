@@ -13,6 +13,7 @@ from numbers import Integral, Real
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 from multimodal_to.errors import InputError, MultimodalError, shown
 
@@ -35,6 +36,7 @@ def checked(function: Function) -> Function:
         InputError: an argument is not what its annotation says.
     """
     signature = inspect.signature(function)
+    said = function.__qualname__.split(".")[-2 if function.__name__ == "__init__" else -1]
 
     @wraps(function)
     def checking(*given: Any, **named: Any) -> Any:
@@ -43,14 +45,19 @@ def checked(function: Function) -> Function:
             kind = signature.parameters[name].kind
             values = value if kind is inspect.Parameter.VAR_POSITIONAL else (value,)
             for one in values:
-                check(f"{function.__name__}: '{name}'", one, hints.get(name, Any))
+                check(f"{said}: '{name}'", one, hints.get(name, Any))
         return function(*given, **named)
 
     return cast(Function, checking)
 
 
 def check_fields(
-    value: Any, error: type[MultimodalError] = InputError, what: str = "", but: tuple[str, ...] = ()
+    value: Any,
+    error: type[MultimodalError] = InputError,
+    what: str = "",
+    but: tuple[str, ...] = (),
+    *,
+    finite: bool = False,
 ) -> None:
     """Check the fields of a dataclass against their annotations.
 
@@ -59,10 +66,14 @@ def check_fields(
         error: what is raised.
         what: the fields are called, with a blank behind; by default only their names stand there.
         but: fields that the dataclass checks itself, in words of its own.
+        finite: refuse numbers that are not.
     """
     hints = _hints(cast(Hashable, type(value)))
     for entry in (entry for entry in fields(value) if entry.name not in but):
-        check(f"{what}{entry.name}", getattr(value, entry.name), hints.get(entry.name, Any), error)
+        held = getattr(value, entry.name)
+        check(f"{what}{entry.name}", held, hints.get(entry.name, Any), error)
+        if finite and isinstance(held, Real) and not np.isfinite(float(held)):
+            raise error(f"{what}{entry.name} is {shown(held)}; expected a finite number")
 
 
 def check(what: str, value: object, annotation: Any, error: type[MultimodalError] = InputError) -> None:
@@ -79,6 +90,32 @@ def check(what: str, value: object, annotation: Any, error: type[MultimodalError
     """
     if not _fits(value, annotation):
         raise error(f"{what} is {shown(value)}; expected {_said(annotation)}")
+
+
+def vector(
+    what: str, value: object, size: int | None, error: type[MultimodalError] = InputError, *, finite: bool = True
+) -> NDArray[np.float64]:
+    """Return numbers as an array of one axis, or refuse what is none.
+
+    Args:
+        what: the value is called.
+        value: an array or a sequence of numbers.
+        size: how many numbers are expected; None takes any.
+        error: what is raised.
+        finite: refuse what is not; NaN is refused either way.
+
+    Raises:
+        MultimodalError: of the kind of `error`; the value is something else.
+    """
+    if not (isinstance(value, np.ndarray) and value.dtype.kind in "iuf"):
+        check(what, value, Sequence[float], error)
+    array = np.asarray(value, dtype=np.float64)
+    expected = array.shape if size is None else (size,)
+    if array.ndim != 1 or array.shape != expected:
+        raise error(f"{what} has the shape {array.shape}; expected ({'n' if size is None else size},)")
+    if np.isnan(array).any() or (finite and not np.isfinite(array).all()):
+        raise error(f"{what} is {shown(array.tolist())}; expected {'finite ' * finite}numbers")
+    return array
 
 
 @cache

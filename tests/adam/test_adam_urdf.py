@@ -521,3 +521,11 @@ def test_numbers_that_are_none_are_named_by_file_element_and_attribute(
     said = str(caught.value)
     assert said.startswith(f"'{file}': {key}=\"{text}\" of <{element}> in '")
     assert f"is not {expected}" in said
+
+
+def test_a_text_that_is_none_or_holds_what_is_no_character_says_so():
+    for empty in ("", " \n\t", "\ufeff"):
+        with pytest.raises(ModelError, match=r"^the URDF text is empty; expected a path, or the XML itself$"):
+            load_tree(empty)
+    with pytest.raises(ModelError, match=r"udc80', which is no character$"):
+        load_tree(robot(link("a\udc80")))

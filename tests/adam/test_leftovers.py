@@ -40,8 +40,28 @@ LOST = {
     ),
     "in an inertial": (
         robot(TRUNK.replace("<mass", '<xacro:m a="1"/><mass'), more=XACRO),
-        "<xacro:m> in <inertial>",
+        '<xacro:m> in <inertial> in <link name="trunk">',
     ),
+    **{
+        f"in a {part}": (
+            robot(TRUNK.replace("</link>", f"<{part}><geometry><xacro:shape/></geometry></{part}></link>"), more=XACRO),
+            f'<xacro:shape> in <geometry> in <{part}> in <link name="trunk">',
+        )
+        for part in ("visual", "collision")
+    },
+    "a mesh": (
+        robot(
+            TRUNK.replace("</link>", '<visual><geometry><mesh filename="$(find p)/a.stl"/></geometry></visual></link>')
+        ),
+        r'filename="\$\(find p\)/a.stl" of <mesh> in <geometry> in <visual> in <link name="trunk">; expand',
+    ),
+    **{
+        f"the attribute {attribute}": (
+            robot(TRUNK, LEG, HIP).replace(attribute, f'{attribute.partition("=")[0]}="${{x}}"', 1),
+            rf'still holds {attribute.partition("=")[0]}="\$\{{x\}}" of <.*; expand the file with xacro',
+        )
+        for attribute in ('value="1"', 'ixx="0.1"', 'xyz="0 1 0"', 'type="continuous"', 'link="leg"', 'name="r"')
+    },
     "a link's name": (
         robot(TRUNK.replace("trunk", "${prefix}trunk")),
         r'name="\$\{prefix\}trunk" of <link> in <robot>',
@@ -80,6 +100,14 @@ def test_a_part_of_the_robot_that_would_get_lost_is_named(case):
     for read in (load_tree, describe):
         with pytest.raises(ModelError, match=expected):
             read(text)
+
+
+def test_a_namespace_that_the_whole_file_stands_in_changes_nothing():
+    text = robot(TRUNK, LEG, HIP, more='xmlns="http://www.ros.org" xmlns:drake="http://drake.mit.edu"')
+    assert load_tree(text).joint_names == ("hip",)
+    assert load_tree(text).total_mass == 2
+    with pytest.raises(ModelError, match="xacro:leg"):
+        load_tree(robot(TRUNK, "<xacro:leg/>", more=f'xmlns="http://www.ros.org" {XACRO}'))
 
 
 def test_what_other_programs_read_is_left_alone_and_what_none_is_known_to_read_is_named():

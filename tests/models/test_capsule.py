@@ -179,8 +179,8 @@ def test_a_plume_reaches_as_far_as_it_says_along_z():
     ("change", "sentence"),
     [
         ({"radius": 0.0}, "radius is 0.0; expected a positive number"),
-        ({"end": (0, 1)}, "end is .*; expected three finite numbers"),
-        ({"start": (0, 0, np.nan)}, "start is .*; expected three finite numbers"),
+        ({"end": (0, 1)}, r"end has the shape \(2,\); expected \(3,\)"),
+        ({"start": (0, 0, np.nan)}, "start is .*; expected finite numbers"),
     ],
 )
 def test_a_capsule_that_cannot_be_is_refused(change, sentence):

@@ -59,6 +59,7 @@ def urdf(folder: Path, *addresses: str, scale: str = "1 1 1") -> Path:
         "../meshes/box.stl",
         "package://boxes/urdf/../meshes/box.stl",
         "package://boxes//meshes/box.stl",
+        "package:///boxes/meshes/box.stl",
         "package://boxes/meshes//./box.stl",
         "PACKAGE://boxes/meshes/box.stl",
         "package://boxes\\meshes\\box.stl",
@@ -226,6 +227,55 @@ def test_one_warning_names_all_meshes_that_cannot_be_drawn_and_why(folder):
     assert text.startswith("4 meshes are not drawn: 'gone.stl': not found; '../../../secret.stl': leaves the folder")
     assert "'../meshes/pointer.stl': a git-LFS pointer" in text
     assert text.endswith("and 1 more")
+
+
+COLLISION = '<collision><origin xyz="0 0 {z}"/><geometry>{shape}</geometry></collision>'
+RED_VISUAL = VISUAL.format("gone.stl", "1 1 1").replace(
+    "</visual>", '<material name="m"><color rgba="1 0 0 1"/></material></visual>'
+)
+BROKEN = ("<box size='1 1 a'/>", "<sphere/>", "<capsule radius='1' length='1'/>", "<box size='1 1'/>")
+
+
+def with_links(folder, **links: str) -> Path:
+    """A URDF of links with these elements in them, each fixed to the first."""
+    path, base = folder / "urdf" / "links.urdf", next(iter(links))
+    joints = [
+        f'<joint name="to_{name}" type="fixed"><parent link="{base}"/><child link="{name}"/></joint>'
+        for name in links
+        if name != base
+    ]
+    written = [f'<link name="{name}">{inside}</link>' for name, inside in links.items()]
+    path.write_text(f'<robot name="r">{"".join((*written, *joints))}</robot>')
+    return path
+
+
+def test_collision_shapes_stand_in_for_meshes_that_cannot_be_drawn(folder):
+    """Where they are and in the visual's colour, once a link; those that cannot be read are left out."""
+    shapes = [COLLISION.format(z=0, shape=shape) for shape in BROKEN]
+    shapes += [COLLISION.format(z=2, shape='<sphere radius="0.3"/>')]
+    shapes += [COLLISION.format(z=3, shape='<mesh filename="../meshes/box.stl" scale="1 1 2"/>')]
+    shapes += [COLLISION.format(z=4, shape='<mesh filename="none.stl"/>')]
+    other = VISUAL.format("../meshes/broken.stl", "1 1 1")
+    path = with_links(folder, base="", foot=RED_VISUAL + other + "".join(shapes), arm=other, whole="".join(shapes))
+    with pytest.warns(MeshWarning) as caught:
+        ball, box = appearance(path).visuals
+    (warning,) = caught
+    assert str(warning.message).startswith("2 meshes are not drawn: 'gone.stl': not found; ")
+    assert str(warning.message).endswith("; the collision shapes of the link foot stand in")
+    assert (ball.link, box.link) == ("foot", "foot")
+    assert ball.name != box.name
+    assert ball.primitive.sphere.radius == 0.3
+    assert (ball.transform[2, 3], box.transform[2, 3]) == (2, 3)
+    assert ball.rgba == box.rgba == (1, 0, 0, 1)
+    np.testing.assert_allclose(np.ptp(box.part.vertices, axis=0), [0.1, 0.2, 0.6], atol=1e-7)
+    (ball,) = appearance(path, meshes=False).visuals
+    assert ball.primitive.sphere is not None
+
+
+def test_a_link_that_can_be_drawn_keeps_its_look_beside_its_collision_shape(folder):
+    shape = COLLISION.format(z=0, shape='<sphere radius="0.3"/>')
+    (visual,) = appearance(with_links(folder, base=VISUAL.format("../meshes/box.stl", "1 1 1") + shape)).visuals
+    assert visual.part is not None
 
 
 def test_a_mesh_is_scaled_and_its_colour_is_the_urdfs(folder):

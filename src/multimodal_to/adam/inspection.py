@@ -12,6 +12,7 @@ from multimodal_to.adam.lean_tree import build_tree, independent
 from multimodal_to.adam.singular import described, massless_motions
 from multimodal_to.adam.tree import Joint, Link, Mimic, Tree
 from multimodal_to.adam.urdf import read_urdf, unread_elements
+from multimodal_to.arguments import checked
 
 EFFORT_PLACEHOLDER = 1e4
 """No joint of a robot that walks gives this much [N m or N]."""
@@ -74,6 +75,7 @@ class Description:
         return "\n".join(lines)
 
 
+@checked
 def describe(
     urdf: str | os.PathLike[str],
     joint_names: Sequence[str] | None = None,

@@ -35,7 +35,6 @@ _ONCE = {
     "inertial": ("origin", "mass", "inertia"),
     "joint": ("parent", "child", "origin", "axis", "limit", "mimic"),
 }
-_NAMES = {"link": ("name", "link"), "joint": ("name", "type", "joint")}
 _UNEXPANDED = re.compile(r"\$+[{(]")
 _EXPAND = "expand the file with xacro first"
 
@@ -44,12 +43,11 @@ def refuse_leftovers(root: Any, source: str) -> None:
     """Refuse a URDF with a part of the robot that no reader of URDF takes.
 
     Raises:
-        ModelError: an element of xacro is left, or a name that xacro has to fill in; a link, a joint or a part of one
-            stands where it is not read; or an element that there is one of stands twice.
+        ModelError: an element of xacro is left, or an attribute that xacro has to fill in; a link, a joint or a part of
+            one stands where it is not read; or an element that there is one of stands twice.
     """
+    _refuse_unexpanded(root, source)
     for owner, element in _unread(root):
-        if _prefix(element) == "xacro":
-            raise ModelError(f"{source} still holds <xacro:{_local(element)}> in {_named(owner)}; {_EXPAND}")
         if (part := _part_of_robot(root, element)) is not None:
             inside = "" if part is element else f" in <{_tag(element)}>"
             right = [tag for tag, names in _OWN.items() if _local(part).lower() in names and not _namespace(part)]
@@ -65,11 +63,6 @@ def refuse_leftovers(root: Any, source: str) -> None:
         for tag in _ONCE.get(element.tag, ()):
             if len(element.findall(tag)) > 1:
                 raise ModelError(f"{source}: {_named(_owner(element))} has more than one <{tag}>")
-        for tag in ("parent", "child", "mimic") if element.tag == "joint" else ():
-            for child in element.iterchildren(tag):
-                _refuse_unexpanded(child, _NAMES["joint" if tag == "mimic" else "link"], _named(element), source)
-        if element.tag in _NAMES:
-            _refuse_unexpanded(element, _NAMES[element.tag], "<robot>", source)
 
 
 def unread(root: Any) -> tuple[tuple[str, str], ...]:
@@ -112,19 +105,41 @@ def _part_of_robot(root: Any, element: Any) -> Any | None:
     return None
 
 
-def _refuse_unexpanded(element: Any, keys: tuple[str, ...], owner: str, source: str) -> None:
-    """Refuse a name that xacro has to fill in.
+def _refuse_unexpanded(root: Any, source: str) -> None:
+    """Refuse a file that xacro has not expanded: an element of xacro, or an attribute of a known one with `${` or `$(`.
 
-    Args:
-        element: with the names as attributes.
-        keys: of these attributes.
-        owner: what the element stands in.
-        source: of the URDF, for the error.
+    What other programs read is left alone.
     """
-    for key in keys:
-        if _UNEXPANDED.search(element.get(key, "")):
-            name = shortened(element.get(key), 60)
-            raise ModelError(f'{source} still holds {key}="{name}" of <{element.tag}> in {owner}; {_EXPAND}')
+    for element in _own(root):
+        if _prefix(element) == "xacro":
+            raise ModelError(f"{source} still holds <xacro:{_local(element)}>{_within(element)}; {_EXPAND}")
+        for key, text in element.attrib.items():
+            if _UNEXPANDED.search(text):
+                raise ModelError(
+                    f'{source} still holds {etree.QName(key).localname}="{shortened(text, 60)}" of '
+                    f"<{_tag(element)}>{_within(element)}; {_EXPAND}"
+                )
+
+
+def _own(element: Any) -> Iterator[Any]:
+    """Yield an element and all that stands in it, without what other programs read."""
+    yield element
+    for child in element:
+        if isinstance(child.tag, str) and child.tag not in _OTHERS.get(element.tag, ()):
+            yield from _own(child)
+
+
+def _within(element: Any) -> str:
+    """Return what an element stands in, up to the first that has a name, as the end of a sentence."""
+    parts = [_named(up) for up in element.iterancestors()]
+    named = [index for index, part in enumerate(parts) if " name=" in part]
+    return "".join(f" in {part}" for part in parts[: named[0] + 1 if named else 1])
+
+
+def _up_to(element: Any, root: Any) -> Iterator[Any]:
+    while element is not root:
+        yield element
+        element = element.getparent()
 
 
 def _named(element: Any) -> str:

@@ -9,7 +9,8 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import Array, Inertia
-from multimodal_to.errors import ModelError, unknown
+from multimodal_to.arguments import checked
+from multimodal_to.errors import InputError, ModelError, unknown
 from multimodal_to.values import Value
 
 BASE = 0
@@ -123,26 +124,34 @@ class Tree(Value):
             coupling[row, body.column] = body.multiplier
         return coupling
 
+    @checked
     def joint_values(self, s: Array) -> dict[str, Array]:
         """Return where every joint of the URDF that can move is: those of s, their followers, and the locked ones.
 
         Args:
             s: joint positions, (n,), or (n, count) for many [rad or m].
         """
-        values = dict(zip(self.joint_names, s, strict=True))
+        values = dict(zip(self.joint_names, self._of_joints("s", s), strict=True))
         values |= {name: how.multiplier * values[how.joint] + how.offset for name, how in self.followers.items()}
         return values | {name: np.full(s.shape[1:], value) for name, value in self.locked.items()}
 
+    def _of_joints(self, what: str, values: Array) -> Array:
+        if values.ndim == 0 or len(values) != len(self.joint_names):
+            raise InputError(f"'{what}' has the shape {values.shape}; expected ({len(self.joint_names)}, ...)")
+        return values
+
+    @checked
     def joint_rates(self, s_dot: Array) -> dict[str, Array]:
         """Return how fast every joint of the URDF that can move does, as `joint_values` says where it is.
 
         Args:
             s_dot: joint velocities, (n,), or (n, count) for many [rad/s or m/s].
         """
-        rates = dict(zip(self.joint_names, s_dot, strict=True))
+        rates = dict(zip(self.joint_names, self._of_joints("s_dot", s_dot), strict=True))
         rates |= {name: how.multiplier * rates[how.joint] for name, how in self.followers.items()}
         return rates | {name: np.zeros(s_dot.shape[1:]) for name in self.locked}
 
+    @checked
     def frame(self, name: str) -> Frame:
         """Return a frame by name.
 
@@ -153,6 +162,7 @@ class Tree(Value):
             raise ModelError(unknown("frame", name, self.frames))
         return self.frames[name]
 
+    @checked
     def path(self, body: int) -> list[int]:
         """Return the bodies from the base's child down to `body`; empty for the base itself."""
         chain: list[int] = []

@@ -16,6 +16,7 @@ from lxml import etree
 from multimodal_to.adam.lean_tree import build_tree, independent
 from multimodal_to.adam.leftovers import refuse_leftovers, unread
 from multimodal_to.adam.tree import Joint, Link, Mimic, Tree
+from multimodal_to.arguments import checked
 from multimodal_to.errors import ModelError, listed, said, shortened
 from multimodal_to.files.numbers import numbers
 from multimodal_to.files.reading import read_bytes
@@ -40,6 +41,7 @@ _UNIT = 1e-6
 """An axis whose length differs from 1 by less than this was meant as a unit one."""
 
 
+@checked
 def load_tree(
     urdf: str | os.PathLike[str],
     joint_names: Sequence[str] | None = None,
@@ -70,11 +72,12 @@ def read_urdf(urdf: str | os.PathLike[str]) -> tuple[list[Link], list[Joint]]:
     return [_link(link) for link in robot.links], [_joint(joint) for joint in robot.joints]
 
 
-def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
+def parse_urdf(urdf: str | os.PathLike[str], *, collisions: bool = False) -> Any:
     """Return what a URDF holds as `yourdfpy` has it: its links with their visuals, joints and materials.
 
     No mesh is looked for. Every element that is kept has what it cannot do without, in finite numbers, and names are
-    not given twice; whether the joints form a tree, `load_tree` says.
+    not given twice; whether the joints form a tree, `load_tree` says. Collision shapes are kept only if they are asked
+    for; one that cannot be read is left out.
 
     Raises:
         ModelError: the file is missing, larger than `LARGEST_URDF` or no URDF, or it has no links, or more than
@@ -83,7 +86,7 @@ def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
     import yourdfpy  # takes longer to import than all the rest, and what reads no URDF does without
 
     root, source = _root(urdf)
-    _keep_what_is_used(root)
+    _keep_what_is_used(root, collisions=collisions)
     _check_names(root, source)
     _refuse_missing(root, source)
     _refuse_non_numbers(root, source)
@@ -138,6 +141,7 @@ def _root(urdf: str | os.PathLike[str]) -> tuple[Any, str]:
         raise ModelError(f"{source} is not valid XML: {said(error)}") from error
     if root.getroottree().docinfo.internalDTD is not None:
         raise ModelError(f"{source} {_ENTITIES}")
+    _drop_namespace(root)
     if root.tag != "robot":
         raise ModelError(f"{source} is no URDF: its root element is <{root.tag}>, expected <robot>")
     if (count := sum(1 for _ in root.iter())) > MOST_ELEMENTS:
@@ -148,11 +152,25 @@ def _root(urdf: str | os.PathLike[str]) -> tuple[Any, str]:
     return root, source
 
 
+def _drop_namespace(root: Any) -> None:
+    """Take a namespace that the whole file stands in off its elements; that of xacro stays."""
+    space = etree.QName(root).namespace
+    if space and "xacro" not in space and root.prefix is None:
+        for element in root.iter(f"{{{space}}}*"):
+            element.tag = etree.QName(element).localname
+        etree.cleanup_namespaces(root)
+
+
 def _read(urdf: str | os.PathLike[str]) -> tuple[bytes, str]:
     if isinstance(urdf, str) and (written := urdf.lstrip(_BLANK)).startswith("<"):
         if len(urdf) > LARGEST_URDF:
             raise ModelError(f"the URDF text is longer than {LARGEST_URDF / 1e6:g} MB, the most that is read")
-        return written.rstrip().encode("utf-8", errors="replace"), _TEXT
+        try:
+            return written.rstrip().encode("utf-8"), _TEXT
+        except UnicodeEncodeError as error:
+            raise ModelError(f"{_TEXT} holds {error.object[error.start]!a}, which is no character") from error
+    if isinstance(urdf, str) and not urdf.strip(_BLANK):
+        raise ModelError(f"{_TEXT} is empty; expected a path, or the XML itself")
     return read_bytes(urdf, LARGEST_URDF, ModelError), f"'{Path(urdf)}'"
 
 
@@ -173,16 +191,27 @@ _NEEDED_WITHIN = {
 _SHAPES = ("box", "cylinder", "sphere", "mesh")
 
 
-def _keep_what_is_used(root: Any) -> None:
+def _keep_what_is_used(root: Any, *, collisions: bool) -> None:
     """Drop what is neither a body, a joint nor something to draw: it may be of any form, and nothing here reads it."""
     for owner in (root, *root.iterchildren("link", "joint")):
-        used = _USED_WITHIN.get(owner.tag, _USED)
+        used = (*_USED_WITHIN.get(owner.tag, _USED), *["collision"] * (collisions and owner.tag == "link"))
         for element in [child for child in owner if child.tag not in used]:
             owner.remove(element)
-    for visual in [*root.iterfind("link/visual")]:
-        geometry = visual.find("geometry")
-        if geometry is None or not len(geometry) or geometry[0].tag not in _SHAPES:
-            visual.getparent().remove(visual)
+    for shape in [*root.iterfind("link/visual"), *root.iterfind("link/collision")]:
+        geometry = shape.find("geometry")
+        drawn = geometry is not None and len(geometry) and geometry[0].tag in _SHAPES
+        if not drawn or (shape.tag == "collision" and _is_broken(shape)):
+            shape.getparent().remove(shape)
+
+
+def _is_broken(shape: Any) -> bool:
+    """Return whether a collision shape lacks an attribute or holds one that is no number."""
+    texts = {(child.tag, key): child.get(key) for child in shape.iter(*_COUNTS) for key in _COUNTS[child.tag]}
+    lacking = (child.get(key) is None for child in shape.iter(*_NEEDED_WITHIN) for key in _NEEDED_WITHIN[child.tag])
+    return any(lacking) or any(
+        text is not None and _number_fault(text, _COUNTS[tag][key], LARGEST_NUMBER) is not None
+        for (tag, key), text in texts.items()
+    )
 
 
 def _check_names(root: Any, source: str) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from multimodal_to.arguments import checked
 from multimodal_to.auditing.margins import MARGINS
 from multimodal_to.auditing.property import Judged, Of, Property
 from multimodal_to.auditing.self_collision import SELF_COLLISION
@@ -459,11 +460,13 @@ PROPERTIES: Mapping[str, Property] = FrozenMapping(
 """Every property by name, in the order of an audit's findings."""
 
 
+@checked
 def judged(scenario: Scenario | None, robot: Robot) -> list[str]:
     """Return the names of the properties that a motion of a robot is judged by, in the order of the table."""
     return [name for name, entry in PROPERTIES.items() if entry.judged.applies(scenario, robot)]
 
 
+@checked
 def check_allowances(robot: Robot, scenario: Scenario) -> None:
     """Refuse a scenario that allows more of a property which its audit does not judge.
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
+from multimodal_to.arguments import checked
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.joint_units import joint_units
 from multimodal_to.models.robot import Robot
@@ -32,6 +33,7 @@ class Judged(Enum):
     STANDING_END = "the scenario ends standing"
     HOVERING_END = "the scenario ends in a hover"
 
+    @checked
     def applies(self, scenario: Scenario | None, robot: Robot) -> bool:
         """Return whether a motion of a robot is judged; without a scenario only its physics is."""
         physics = {
@@ -72,6 +74,7 @@ class Of(Enum):
     THRUST = "of the least `thrust_max`"
     """The greatest thrust of its smallest jet [N]; without jets it is infinite."""
 
+    @checked
     def size(self, robot: Robot) -> float:
         """Return how much it is for a robot."""
         return {
@@ -101,6 +104,7 @@ class Property:
     second_order_limit: float | None = None  # the limit under the second-order friction cone, where it is another one
     first_order_limit: float | None = None  # the limit by an integration rule of order one, where it is another one
 
+    @checked
     def unit_for(self, robot: Robot, body: str) -> str:
         """Return the unit of a finding: that of a joint goes by whether it turns or slides.
 
@@ -112,6 +116,7 @@ class Property:
             return joint_units(robot, self.unit)[robot.joint_names.index(body)]
         return self.unit
 
+    @checked
     def limit_for(self, robot: Robot, scenario: Scenario | None, rule: str = rules.LEAPFROG) -> float:
         """Return the limit in `unit`.
 

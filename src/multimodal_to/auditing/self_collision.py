@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.auditing.findings import Worst, worst_of
 from multimodal_to.auditing.property import Judged, Property
 from multimodal_to.models import capsule_pairs
@@ -34,6 +35,7 @@ class Clearance:
     knot: int  # at which it is
 
 
+@checked
 def link_findings(robot: Robot, trajectory: Trajectory) -> list[Worst]:
     """Return the largest overlap of two capsules at a knot; nothing for a robot without capsules."""
     if not robot.capsules:
@@ -42,6 +44,7 @@ def link_findings(robot: Robot, trajectory: Trajectory) -> list[Worst]:
     return [worst_of("link distance", -_distances(robot, trajectory), names)]
 
 
+@checked
 def link_clearances(robot: Robot, trajectory: Trajectory) -> tuple[Clearance, ...]:
     """Return the least distance of every pair of `robot.capsule_pairs` over the knots, nearest pairs first.
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.urdf import parse_urdf
+from multimodal_to.arguments import checked
 from multimodal_to.auditing.self_collision import Clearance
 from multimodal_to.errors import OutputError
 from multimodal_to.models.capsule_pairs import FEWEST_JOINTS, joints_between, poses_in_base
@@ -32,6 +33,7 @@ class Solid(Value):
     radius: float  # of the sphere around the solid's origin that holds it [m]
 
 
+@checked
 def urdf_solids(robot: Robot) -> tuple[Solid, ...]:
     """Return the boxes, cylinders and spheres among the visuals of a robot's URDF.
 
@@ -57,6 +59,7 @@ def urdf_solids(robot: Robot) -> tuple[Solid, ...]:
     return tuple(found)
 
 
+@checked
 def hull(link: str, transform: Array, vertices: Array) -> Solid:
     """Return the convex hull of a mesh as a part of a link.
 
@@ -79,6 +82,7 @@ def hull(link: str, transform: Array, vertices: Array) -> Solid:
     return Solid(link=link, transform=placed, shape=shape, radius=float(np.linalg.norm(arms, axis=1).max()))
 
 
+@checked
 def solid_clearances(
     robot: Robot, trajectory: Trajectory, solids: Sequence[Solid] | None = None
 ) -> tuple[Clearance, ...]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from multimodal_to.arguments import checked
+
 
 class Severity(Enum):
     """How bad a symptom is."""
@@ -40,6 +42,7 @@ class Diagnosis:
         order = list(Severity)
         object.__setattr__(self, "findings", tuple(sorted(self.findings, key=lambda item: order.index(item.severity))))
 
+    @checked
     def of(self, severity: Severity) -> tuple[Symptom, ...]:
         """Return the findings of a severity."""
         return tuple(finding for finding in self.findings if finding.severity is severity)

@@ -63,6 +63,7 @@ def doctor(robot: Robot, scenario: Scenario, formulation: Formulation | None = N
     return Diagnosis(findings=(*findings, *(finding for check in ONCE_SOUND for finding in check(task))))
 
 
+@checked
 def refusal(name: str, found: str | MultimodalError, change: str = "") -> Diagnosis:
     """Return the diagnosis of a task that cannot even be looked at.
 

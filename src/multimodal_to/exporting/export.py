@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import OutputError
 from multimodal_to.exporting.consumers import WholeMotion, by_name, by_place, whole_motion
 from multimodal_to.files.writing import whole as whole_file
@@ -33,6 +34,7 @@ CONVENTIONS = (
 )
 
 
+@checked
 def columns(robot: Robot, trajectory: Trajectory) -> dict[str, tuple[str, Array]]:
     """Return every row of every quantity by name, as ``joint_positions.l_knee``, with its unit and values.
 
@@ -79,6 +81,7 @@ def _followers(robot: Robot, trajectory: Trajectory) -> dict[str, Array]:
     }
 
 
+@checked
 def write_csv(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
     """Write one row for each knot; lines that start with # say the conventions, the first other one names and units.
 
@@ -97,6 +100,7 @@ def write_csv(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]
     return Path(path)
 
 
+@checked
 def write_mat(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
     """Write a MATLAB file (version 5): every quantity and the joint torques, (rows, knots + 1), names, units.
 
@@ -144,6 +148,7 @@ def _mat_units(quantity: Quantity, robot: Robot) -> str | Array:
     return np.array(units, dtype=object) if len(set(units)) > 1 else next(iter(units), quantity.unit)
 
 
+@checked
 def write_mujoco(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
     """Write an `.npz` with MuJoCo's qpos, qvel and ctrl for a free base, a row for each knot, and `conventions`.
 
@@ -176,6 +181,7 @@ def write_mujoco(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[s
     return _write_arrays(robot, trajectory, path, parts, conventions, whole)
 
 
+@checked
 def write_pinocchio(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
     """Write an `.npz` with Pinocchio's q, v and tau for a free flyer, a row for each knot, and `conventions`.
 

@@ -17,7 +17,8 @@ import numpy as np
 
 from multimodal_to.adam.kinematics import Pose
 from multimodal_to.adam.spatial import SX, Array
-from multimodal_to.errors import ModelError, shown
+from multimodal_to.arguments import check_fields, vector
+from multimodal_to.errors import ModelError
 from multimodal_to.values import Value
 
 PULL = 0.02
@@ -48,11 +49,10 @@ class Capsule(Value):
 
     def __post_init__(self) -> None:
         for key in ("start", "end"):
-            point = np.array(getattr(self, key), dtype=float)
-            if point.shape != (3,) or not np.isfinite(point).all():
-                raise ModelError(f"capsule '{self.name}': {key} is {shown(point)}; expected three finite numbers")
-            point.flags.writeable = False
+            point = vector(f"capsule '{self.name}': {key}", getattr(self, key), 3, ModelError)
             object.__setattr__(self, key, point)
+        check_fields(self, ModelError, f"capsule '{self.name}': ")
+        super().__post_init__()
         if not 0 < self.radius < np.inf:
             raise ModelError(f"capsule '{self.name}': radius is {self.radius}; expected a positive number")
 

@@ -12,6 +12,8 @@ from enum import Enum
 import casadi as cs
 
 from multimodal_to.adam.spatial import SX
+from multimodal_to.arguments import check_fields
+from multimodal_to.errors import ModelError
 from multimodal_to.models.terrain import Surface
 
 
@@ -21,6 +23,9 @@ class ContactPoint:
 
     frame: str
     foot: str
+
+    def __post_init__(self) -> None:
+        check_fields(self, ModelError, "the contact point's ")
 
 
 class FrictionCone(Enum):

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from multimodal_to.adam.spatial import SX
-from multimodal_to.errors import InputError
+from multimodal_to.arguments import check_fields
+from multimodal_to.errors import InputError, ModelError
 from multimodal_to.models.capsule import Capsule
 
 
@@ -42,6 +43,9 @@ class JetModel:
     """Coefficient of u² in the input u + B_UU u² [1/%]."""
     c: float
     """Constant part of T̈ [N/s²]."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, ModelError, "the jet model's ", finite=True)
 
     def acceleration(self, thrust: SX, thrust_rate: SX, throttle: SX) -> SX:
         """Return T̈ [N/s²].
@@ -88,3 +92,6 @@ class Jet:
     throttle_min: float  # [%]
     throttle_max: float  # [%]
     plume: Capsule | None = None  # its exhaust, along +z of `frame`
+
+    def __post_init__(self) -> None:
+        check_fields(self, ModelError, "the jet's ", finite=True)

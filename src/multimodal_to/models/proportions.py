@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import check_fields
+from multimodal_to.errors import ModelError
 
 BEYOND_HOME = 0.25
 """How much farther from the CoM than at home contact points and jets may go by default, as a share of L [1]."""
@@ -29,6 +31,9 @@ class Gait:
 
     lift: float  # height of a swing [m]
     swing: float  # share of a step's time in which its foot is in the air [1]
+
+    def __post_init__(self) -> None:
+        check_fields(self, ModelError, "the gait's ", finite=True)
 
 
 def standing_height(contacts: Array, jets: Array) -> float:

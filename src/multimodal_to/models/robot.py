@@ -6,7 +6,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -16,7 +16,7 @@ import numpy as np
 from multimodal_to.adam import KinDynComputations, quaternion
 from multimodal_to.adam.inspection import is_placeholder
 from multimodal_to.adam.spatial import Array
-from multimodal_to.arguments import checked
+from multimodal_to.arguments import check_fields, checked, vector
 from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
 from multimodal_to.files.reading import read_toml
 from multimodal_to.files.records import Records
@@ -36,13 +36,19 @@ NamePairs = frozenset[frozenset[str]]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Posture(Value):
-    """A configuration of the robot: base in the world and joints; of ρ and −ρ it keeps the one of `attitude.signed`."""
+    """A configuration of the robot: base in the world and joints; of ρ and −ρ it keeps the one of `attitude.signed`.
+
+    Raises:
+        InputError: a field is no vector of finite numbers, or one of another size.
+    """
 
     base_position: Array  # (3,) [m]
     base_quaternion_xyzw: Array  # (4,), unit, world-from-base
     joint_positions: Array  # (n,) [rad or m]
 
     def __post_init__(self) -> None:
+        for name, size in (("base_position", 3), ("base_quaternion_xyzw", 4), ("joint_positions", None)):
+            object.__setattr__(self, name, vector(f"the posture's {name}", getattr(self, name), size))
         super().__post_init__()
         self.__setstate__({"base_quaternion_xyzw": attitude.signed(self.base_quaternion_xyzw)})
 
@@ -57,17 +63,31 @@ class Posture(Value):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class JointLimits(Value):
-    """Ranges to plan in, each (n,) in the order of the joints."""
+    """Ranges to plan in, each (n,) in the order of the joints.
+
+    Raises:
+        InputError: one is no vector of numbers.
+    """
 
     lower: Array  # [rad or m]
     upper: Array  # [rad or m]
     speed: Array  # [rad/s or m/s]
     effort: Array  # [N m or N]; inf where none is known
 
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            limits = vector(f"the joint limits' {entry.name}", getattr(self, entry.name), None, finite=False)
+            object.__setattr__(self, entry.name, limits)
+        super().__post_init__()
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Robot(Value):
-    """Everything that depends on the robot and not on the task."""
+    """Everything that depends on the robot and not on the task.
+
+    Raises:
+        ModelError: a field is not what it is said to be here.
+    """
 
     name: str
     urdf: Path
@@ -86,6 +106,14 @@ class Robot(Value):
     held_pairs: NamePairs = frozenset()  # of capsules that a problem holds apart; empty: `near_capsule_pairs` chooses
     lean_xyzw: Array = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
     """Rotation from upright to home in the base's axes, (4,): ρ_home = ρ_upright ∘ lean."""
+
+    def __post_init__(self) -> None:
+        for name, size in (("contact_reach", 3), ("jet_reach", 3), ("lean_xyzw", 4)):
+            object.__setattr__(self, name, vector(f"the robot's {name}", getattr(self, name), size, ModelError))
+        check_fields(self, ModelError, "the robot's ")
+        if not 0.0 <= self.friction < np.inf:
+            raise ModelError(f"the robot's friction is {self.friction}; expected a number of at least zero")
+        super().__post_init__()
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -209,6 +237,7 @@ class Robot(Value):
                 raise ModelError(unknown("jet", name, known))
         return replace(self, jets=tuple(known[name] for name in names))
 
+    @checked
     def com_at(self, posture: Posture) -> Array:
         """Return where the CoM is in a posture, in the world [m], (3,)."""
         return np.array(self.kindyn.CoM_position(posture.base_transform, posture.joint_positions)).ravel()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked, vector
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.values import Value
@@ -31,12 +33,7 @@ class State(Value):
 
     def __post_init__(self) -> None:
         for entry in fields(self):
-            value = np.array(getattr(self, entry.name), dtype=float)
-            size = _SIZES.get(entry.name, value.size)
-            if value.shape != (size,):
-                raise InputError(f"the state's {entry.name} has the shape {value.shape}; expected ({size},)")
-            if not np.isfinite(value).all():
-                raise InputError(f"the state's {entry.name} is {value.tolist()}; expected finite numbers")
+            value = vector(f"the state's {entry.name}", getattr(self, entry.name), _SIZES.get(entry.name))
             object.__setattr__(self, entry.name, value)
         length = float(np.linalg.norm(self.base_quaternion_xyzw))
         if not length > 0.0:
@@ -48,7 +45,10 @@ class State(Value):
         super().__post_init__()
 
     @classmethod
-    def at_rest(cls, robot: Robot, posture: Posture | None = None, thrust: Array | None = None) -> State:
+    @checked
+    def at_rest(
+        cls, robot: Robot, posture: Posture | None = None, thrust: Sequence[float] | Array | None = None
+    ) -> State:
         """Return a state in which nothing moves.
 
         Args:
@@ -65,7 +65,7 @@ class State(Value):
             base_linear_velocity=np.zeros(3),
             base_angular_velocity=np.zeros(3),
             joint_velocities=joints,
-            thrust=jets if thrust is None else thrust,
+            thrust=jets if thrust is None else np.asarray(thrust),
             thrust_rate=jets,
         )
 
@@ -78,10 +78,12 @@ class State(Value):
             joint_positions=self.joint_positions,
         )
 
+    @checked
     def com(self, robot: Robot) -> Array:
         """Return where the CoM is in the world [m], (3,)."""
         return robot.com_at(self.posture)
 
+    @checked
     def momentum(self, robot: Robot) -> tuple[Array, Array]:
         """Return the velocity of the CoM [m/s] and the angular momentum about it [kg m²/s], world axes, (3,) each."""
         twist = np.concatenate([self.base_linear_velocity, self.base_angular_velocity])
@@ -90,6 +92,7 @@ class State(Value):
         momentum = np.array(both).ravel()
         return momentum[:3] / robot.mass, momentum[3:]
 
+    @checked
     def refuse_other_robot(self, robot: Robot) -> None:
         """Make sure that the state has the joints and the jets of a robot.
 

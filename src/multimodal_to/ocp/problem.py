@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.ocp.formulation import Formulation
@@ -91,6 +92,7 @@ class Problem(Value):
     def _asked(self) -> tuple[Robot, Scenario, Formulation]:
         return self.robot, self.scenario, self.formulation
 
+    @checked
     def start_from(self, trajectory: Trajectory) -> Array:
         """Return x for a motion of the same robot: at equal shares of its duration, moved within the bounds.
 
@@ -107,15 +109,18 @@ class Problem(Value):
         x = np.append(values.ravel(order="F"), trajectory.duration / knots) / self.scale
         return np.clip(x, self.lower, self.upper)
 
+    @checked
     def rows_at(self, x: Array) -> Array:
         """Return g(x), in solver units."""
         return np.array(self.nlp.rows(x)).ravel()
 
+    @checked
     def scaled_violation(self, x: Array, g: Array) -> float:
         """Return the largest violation of all rows g = g(x) and bounds, in solver units."""
         rows = missed(g, self.row_lower, self.row_upper).max(initial=0.0)
         return float(max(rows, missed(x, self.lower, self.upper).max(initial=0.0)))
 
+    @checked
     def largest_violations(self, x: Array, g: Array | None = None) -> dict[str, float]:
         """Return by how much each set of rows, and each variable's bounds, are missed at x, in their own units.
 
@@ -133,6 +138,7 @@ class Problem(Value):
         report["bounds of interval"] = float(outside[-1])
         return report
 
+    @checked
     def costs(self, x: Array) -> dict[str, float]:
         """Return each named cost's share of the objective at x, in the scenario's weights."""
         report = dict.fromkeys(self.cost_names, 0.0)
@@ -140,6 +146,7 @@ class Problem(Value):
             report[name] += float(value)
         return report
 
+    @checked
     def unit_at(self, name: str, x: Array, g: Array | None = None) -> str:
         """Return the unit of a violation that `largest_violations` names: that of its worst row.
 
@@ -160,10 +167,12 @@ class Problem(Value):
         outside = missed(x, self.box_lower, self.box_upper) * self.scale
         return units[int(self.layout.read_horizon(outside)[variable].max(axis=1).argmax())]
 
+    @checked
     def variable_units(self, variable: str) -> tuple[str, ...]:
         """Return the unit of each row of a variable at a knot; none for the interval."""
         return row_units(QUANTITIES[variable], self.robot) if variable in QUANTITIES else ()
 
+    @checked
     def unit(self, name: str) -> str:
         """Return the unit of a violation that `largest_violations` names, or all of its rows' units."""
         if rows := self.rows.get(name) or self.bound_rows.get(name):

@@ -17,7 +17,7 @@ import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import SX, Array
-from multimodal_to.arguments import check_fields
+from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import FormulationError, MultimodalError, listed, said, shown
 from multimodal_to.models.joint_units import either, joint_units
 from multimodal_to.ocp.integration import Interval
@@ -85,21 +85,25 @@ class Within:
         return float(lower), float(upper)
 
 
+@checked
 def equal(value: Limit = 0.0) -> Within:
     """Return the set of one value."""
     return Within(value, value)
 
 
+@checked
 def at_least(value: Limit) -> Within:
     """Return the set of what is no smaller than a value."""
     return Within(value, math.inf)
 
 
+@checked
 def at_most(value: Limit) -> Within:
     """Return the set of what is no greater than a value."""
     return Within(-math.inf, value)
 
 
+@checked
 def between(lower: Limit, upper: Limit) -> Within:
     """Return the set of what lies between two values."""
     return Within(lower, upper)

@@ -1,6 +1,7 @@
 """Figures of one or several `Trajectory`s, which the caller shows or saves: nothing is shown here."""
 
 # isort: off
+from multimodal_to.arguments import checked
 from multimodal_to.plotting import backend  # noqa: F401  # before all that imports matplotlib
 
 # isort: on
@@ -14,6 +15,7 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.plotting.contacts import plot_contacts
 from multimodal_to.plotting.forces import plot_forces
 from multimodal_to.plotting.joints import plot_joints, plot_torques
+from multimodal_to.plotting.lettering import LetterWarning
 from multimodal_to.plotting.margins import plot_margins
 from multimodal_to.plotting.motion import plot_com, plot_momentum
 from multimodal_to.plotting.style import SUFFIXES, save
@@ -23,6 +25,7 @@ from multimodal_to.values import FrozenMapping
 __all__ = [
     "FIGURES",
     "SUFFIXES",
+    "LetterWarning",
     "plot",
     "plot_com",
     "plot_contacts",
@@ -53,6 +56,7 @@ FIGURES: Mapping[str, _Plot] = FrozenMapping(
 """The figures by name."""
 
 
+@checked
 def plot(name: str, robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Return a figure by its name in `FIGURES`.
 

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
+from multimodal_to.plotting.lettering import lettered
 from multimodal_to.plotting.style import (
     COLOURS,
     Run,
@@ -25,6 +27,7 @@ from multimodal_to.trajectory.derived import acting_times, flight_force, spans
 _BAR = 0.8  # of the height that a contact point has in the timeline
 
 
+@checked
 def plot_contacts(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Plot a timeline of the contact points by foot, and each foot's vertical force [N] and least height [mm].
 
@@ -56,7 +59,7 @@ def plot_contacts(robot: Robot, *trajectories: Trajectory, labels: Sequence[str]
     finish((force, height), 2.0)
     legend_above(force)
     figure.align_ylabels()
-    return figure
+    return lettered(figure)
 
 
 def _draw_timeline(axes: Axes, runs: Sequence[Run], feet: Sequence[str]) -> None:

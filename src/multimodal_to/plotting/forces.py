@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
+from multimodal_to.plotting.lettering import lettered
 from multimodal_to.plotting.style import (
     COLOURS,
     Run,
@@ -24,6 +26,7 @@ from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import vertical_thrust
 
 
+@checked
 def plot_forces(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Plot throttle [%], thrust [N] and total vertical contact force [N] over time, one panel each.
 
@@ -56,7 +59,7 @@ def plot_forces(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
     for axes in panels:
         legend_above(axes)
     figure.align_ylabels()
-    return figure
+    return lettered(figure)
 
 
 def _draw_vertical(axes: Axes, runs: Sequence[Run]) -> None:

@@ -9,8 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure, SubFigure
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.models.joint_units import joint_units, slides
 from multimodal_to.models.robot import Robot
+from multimodal_to.plotting.lettering import lettered
 from multimodal_to.plotting.style import (
     SMALL,
     Run,
@@ -30,6 +32,7 @@ _COLUMNS = 6
 _CELL = (2.15, 1.55)  # [inch]
 
 
+@checked
 def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Plot every joint's position [rad or m] over its whole range, which dashed lines end, and the speeds by group.
 
@@ -55,9 +58,10 @@ def plot_joints(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
         whole_range=True,
     )
     _speeds(lower, robot, runs)
-    return figure
+    return lettered(figure)
 
 
+@checked
 def plot_torques(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Plot every joint's torque [N m], or force [N], and, dashed, its effort limit (`derived.joint_torques`).
 
@@ -72,7 +76,7 @@ def plot_torques(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] 
     effort = robot.joint_limits.effort
     values = [blank(joint_torques(run.robot, run.trajectory), run.trajectory) for run in runs]
     _cells(figure, runs, values, "joint_positions", _effort_title(robot), "N m", -effort, effort, whole_range=False)
-    return figure
+    return lettered(figure)
 
 
 def _cells(

@@ -9,10 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from multimodal_to.arguments import checked
 from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.auditing.findings import Finding
+from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
+from multimodal_to.plotting.lettering import lettered
 from multimodal_to.plotting.style import (
     COLOURS,
     LIMIT,
@@ -33,6 +36,7 @@ _FLOOR, _PRODUCT_FLOOR = 1e-6, 1e-8  # of what is drawn on the logarithmic axes
 _FAILED = "#d62728"
 
 
+@checked
 def plot_margins(
     robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None, audits: Sequence[Audit] | None = None
 ) -> Figure:
@@ -53,12 +57,14 @@ def plot_margins(
     """
     runs = runs_of(robot, trajectories, labels)
     reports = list(audits) if audits is not None else [audit(run.robot, run.trajectory) for run in runs]
+    if len(reports) != len(runs):
+        raise InputError(f"there are {len(runs)} trajectories and {len(reports)} audits; expected one for each")
     count = len(_properties(reports))
     figure = new_figure(runs, "complementarity and audit", (8.0, 3.6 + count * (0.19 + 0.06 * (len(runs) - 1))))
     products, properties = figure.subplots(2, 1, height_ratios=[2.2, count * 0.19])
     _draw_products(products, runs)
     _draw_findings(properties, runs, reports)
-    return figure
+    return lettered(figure)
 
 
 def _draw_products(axes: Axes, runs: Sequence[Run]) -> None:

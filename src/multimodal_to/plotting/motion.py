@@ -6,13 +6,16 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
+from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
+from multimodal_to.plotting.lettering import lettered
 from multimodal_to.plotting.style import Run, draw_flight, draw_lines, finish, legend_above, new_figure, runs_of
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 
 _SIZE = (9.5, 6.8)
 
 
+@checked
 def plot_com(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Plot position [m] and velocity [m/s] of the CoM in the world over time, a row for each of x, y and z.
 
@@ -24,6 +27,7 @@ def plot_com(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | No
     return _components(runs, "centre of mass", columns)
 
 
+@checked
 def plot_momentum(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Plot the angular momentum about the CoM [kg m²/s] and its rate [N m], world axes, a row for each of x, y and z.
 
@@ -55,4 +59,4 @@ def _components(runs: Sequence[Run], what: str, columns: Sequence[tuple[str, str
         grid[2, column].set_xlabel("time [s]")
     legend_above(grid[0, 0])
     figure.align_ylabels()
-    return figure
+    return lettered(figure)

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, OutputError
 from multimodal_to.files.writing import whole
 from multimodal_to.models.robot import Robot
@@ -189,6 +190,7 @@ def legend_above(axes: Axes) -> None:
     )
 
 
+@checked
 def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     """Write a figure as PNG, SVG or PDF, by its suffix; whole or not at all.
 

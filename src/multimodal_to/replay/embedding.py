@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from dataclasses import dataclass, field
 
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.page import page
@@ -32,6 +33,7 @@ class Embedded:
         return f'<iframe title="replay" style="{style}" srcdoc="{html.escape(self.page)}"></iframe>'
 
 
+@checked
 def embed(robot: Robot, trajectory: Trajectory, *, meshes: bool = True, height: int = 520) -> Embedded:
     """Return the replay as a notebook shows it, in a frame of that height [pixel]; with meshes it has some 7 MB.
 

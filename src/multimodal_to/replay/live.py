@@ -11,6 +11,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 from multimodal_to import children
+from multimodal_to.arguments import checked
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.motion import draw_motion
@@ -19,6 +20,7 @@ from multimodal_to.replay.visuals import appearance
 from multimodal_to.trajectory import Trajectory
 
 
+@checked
 def show(
     robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = None, meshes: bool = True
 ) -> meshcat.Visualizer:

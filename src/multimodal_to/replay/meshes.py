@@ -139,7 +139,7 @@ def _places(
     """
     homes = tuple(dict.fromkeys((urdf.absolute(), urdf.resolve())))
     if scheme in _SCHEMES:
-        name, _, inside = address.partition("/")
+        name, _, inside = address.lstrip("/").partition("/")
         roots = [root for home in homes for root in _package_folders(name, home) if root.is_dir()]
         for root in roots:
             yield (root, root), inside.lstrip("/")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -18,10 +19,11 @@ from multimodal_to.replay.ghost import draw_ghost, in_step
 from multimodal_to.replay.scene import Scene, meshcat
 from multimodal_to.replay.stage import View, draw_stage
 from multimodal_to.replay.visuals import Appearance, Visual
-from multimodal_to.scenarios.data import stored
+from multimodal_to.scenarios.data import OwnSurfaceError, stored
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 from multimodal_to.trajectory.derived import frame_poses
 from multimodal_to.trajectory.resampling import resample
+from multimodal_to.trajectory.sameness import refuse_other_robot
 
 FOLLOW_FROM = 0.6
 """The camera follows the CoM along the ground in motions that go farther than this [m]."""
@@ -35,6 +37,10 @@ _STILL_ZOOM = 4.0  # from farther off, so that ghosts look alike
 _CLOCK = 0.01  # what the clock of a page shows [s]: a time so near to start or end means it
 _GAP = 0.25  # between the ghosts of a motion that stays in its place, per width of the robot
 _FAINTEST = 0.45  # opacity of the first of the ghosts that may overlap
+
+
+class GroundWarning(UserWarning):
+    """The ground of a motion is not known."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,6 +76,7 @@ def draw_motion(
         ghost: another motion of the same robot, drawn faint in the same scene; it begins when this one does.
         live: draw for meshcat's own page.
     """
+    refuse_other_robot(trajectory, robot)
     scene = Scene(visualizer=visualizer, time=trajectory.time - trajectory.time[0])
     com = trajectory.com_position.T * [1.0, 1.0, 0.0]
     span = np.ptp(com, axis=0)
@@ -120,6 +127,9 @@ def draw_still(
     Raises:
         InputError: a time is not within the trajectory, or times do not increase.
     """
+    refuse_other_robot(trajectory, robot)
+    if not 0.0 < aspect < np.inf:
+        raise InputError(f"the picture's width over height is {aspect}; expected a positive number")
     instants = np.asarray(times, dtype=float)
     ends = np.clip(instants, trajectory.time[0], trajectory.time[-1])
     instants = np.where(np.abs(instants - ends) < _CLOCK, ends, instants)
@@ -156,8 +166,15 @@ def draw_still(
 
 
 def surface_of(trajectory: Trajectory) -> Surface:
-    """Return the ground of the scenario that the trajectory keeps; flat where it keeps none."""
-    scenario = stored(trajectory)
+    """Return the ground of the scenario that the trajectory keeps; flat where it keeps none.
+
+    It is flat as well where the ground is of a class of one's own, and a `GroundWarning` says so.
+    """
+    try:
+        scenario = stored(trajectory)
+    except OwnSurfaceError as error:
+        warnings.warn(f"drawn on flat ground: {str(error).partition(';')[0]}", GroundWarning, stacklevel=2)
+        return FlatGround()
     return FlatGround() if scenario is None else scenario.surface
 
 

@@ -6,12 +6,14 @@ import base64
 import html
 import json
 import os
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from string import Template
 from typing import Any
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked, vector
 from multimodal_to.files.writing import write_text
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.ghost import GHOST_COLOUR
@@ -28,6 +30,7 @@ _COM = ("#2b6ce0", "sphere and line: centre of mass")
 _FLIGHT = ("#d62728", "bar above the time: flight")
 
 
+@checked
 def write_html(
     robot: Robot,
     trajectory: Trajectory,
@@ -54,6 +57,7 @@ def write_html(
     return write_text(path, page(robot, trajectory, ghost=ghost, meshes=meshes))
 
 
+@checked
 def page(robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = None, meshes: bool = True) -> str:
     """Return the page that `write_html` writes.
 
@@ -66,10 +70,11 @@ def page(robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = Non
     return _page(trajectory, player(robot, trajectory, ghost=ghost, meshes=meshes))
 
 
+@checked
 def write_still_html(
     robot: Robot,
     trajectory: Trajectory,
-    times: Array,
+    times: Sequence[float] | Array,
     path: str | os.PathLike[str],
     *,
     aspect: float,
@@ -90,10 +95,18 @@ def write_still_html(
         OutputError: the folder does not exist or cannot be written.
     """
     recorder, look = Recorder(), appearance(robot.urdf, meshes=meshes)
-    picture = draw_still(meshcat.Visualizer(window=recorder), robot, trajectory, times, look, aspect)
+    picture = draw_still(
+        meshcat.Visualizer(window=recorder),
+        robot,
+        trajectory,
+        vector("the times of the snapshots", times, None),
+        look,
+        aspect,
+    )
     return write_text(path, _page(trajectory, _player(robot, trajectory, recorder, picture, look.attribution)))
 
 
+@checked
 def player(robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = None, meshes: bool = True) -> str:
     """Return the HTML that plays the motion, for a page that has one: a block as high as what it stands in.
 

@@ -11,7 +11,8 @@ import numpy as np
 from PIL import Image
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import InputError, OutputError
+from multimodal_to.arguments import checked
+from multimodal_to.errors import InputError, OutputError, shown
 from multimodal_to.files.writing import scratch, whole
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, uphill
@@ -26,9 +27,12 @@ from multimodal_to.trajectory.resampling import resample
 GIF_SIZE, MP4_SIZE = (640, 560), (960, 720)  # [pixel]
 SNAPSHOT_SIZE = (400, 760)  # of each robot in a still scene [pixel]
 _COLOURS = 128  # of a GIF
+LARGEST_SIDE = 8192
+"""Most pixels of a picture along each side; browsers draw no more."""
 _ROOM = 0.35  # between ghosts that stand where they were [m]
 
 
+@checked
 def write_gif(
     robot: Robot,
     trajectory: Trajectory,
@@ -55,6 +59,7 @@ def write_gif(
         OutputError: there is no browser, or the file cannot be written.
     """
     times = _frame_times(trajectory, rate)
+    _check_size(size)
     with whole(path) as draft:
         shots = _film(robot, trajectory, times, size, ghost, meshes)
         frames = [Image.open(io.BytesIO(shot)).convert("RGB") for shot in shots]
@@ -68,6 +73,7 @@ def write_gif(
     return Path(path)
 
 
+@checked
 def write_mp4(
     robot: Robot,
     trajectory: Trajectory,
@@ -98,6 +104,7 @@ def write_mp4(
     except ImportError as error:
         raise OutputError("MP4 needs imageio-ffmpeg: pip install 'multimodal-to[video]'") from error
     times = _frame_times(trajectory, rate)
+    _check_size(size)
     with whole(path) as draft:
         writer = imageio_ffmpeg.write_frames(
             str(draft),
@@ -123,6 +130,7 @@ def write_mp4(
     return Path(path)
 
 
+@checked
 def write_snapshots(
     robot: Robot,
     trajectory: Trajectory,
@@ -147,6 +155,8 @@ def write_snapshots(
         OutputError: there is no browser, or the file cannot be written.
     """
     instants = snapshot_times(robot, trajectory) if times is None else np.array(list(times), dtype=float)
+    if size is not None:
+        _check_size(size)
     width, height = size or (max(SNAPSHOT_SIZE[0] * instants.size, SNAPSHOT_SIZE[1]), SNAPSHOT_SIZE[1])
     with scratch() as folder, whole(path) as draft:
         page = folder / "still.html"
@@ -158,6 +168,7 @@ def write_snapshots(
     return Path(path)
 
 
+@checked
 def snapshot_times(robot: Robot, trajectory: Trajectory) -> Array:
     """Return times [s] that tell a motion: start and end, and those where flight begins or ends, or even ones.
 
@@ -185,6 +196,13 @@ def _apart(trajectory: Trajectory, times: Array) -> Array:
         if np.linalg.norm(com[kept] - com[index], axis=1).min() > _ROOM:
             kept.append(index)
     return np.asarray(times[np.sort(kept)])
+
+
+def _check_size(size: tuple[int, int]) -> None:
+    if len(size) != 2 or not all(1 <= side <= LARGEST_SIDE for side in size):
+        raise InputError(
+            f"the size of the pictures is {shown(size)}; expected width and height, 1 to {LARGEST_SIDE} pixels"
+        )
 
 
 def _frame_times(trajectory: Trajectory, rate: float) -> Array:

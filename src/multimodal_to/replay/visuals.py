@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.urdf import parse_urdf
-from multimodal_to.errors import MultimodalError
+from multimodal_to.errors import MultimodalError, listed
 from multimodal_to.replay.dress import Dress, read_dress
 from multimodal_to.replay.meshes import MeshWarning, Part, load_parts, simplified
 from multimodal_to.values import Value
@@ -49,20 +49,29 @@ class Appearance:
 def appearance(urdf: Path, *, meshes: bool = True) -> Appearance:
     """Return the visuals of a robot's URDF, dressed as the `dress.toml` beside it says if its package is installed.
 
-    Meshes that cannot be drawn are left out and named in one `MeshWarning`. Without `meshes` there are only primitives.
+    Meshes that cannot be drawn are named in one `MeshWarning`, and the collision shapes of their links stand in for
+    them. Without `meshes` there are only primitives.
     """
-    robot = parse_urdf(urdf)
+    robot = parse_urdf(urdf, collisions=True)
     dress = read_dress(urdf.parent) if meshes else None
     problems: dict[str, str] = {}
     palette = _palette(robot)
     found = []
+    replaced = []
     for link in robot.links:
-        for index, visual in enumerate(link.visuals):
-            if dress is None or not dress.replaces(link.name, visual.name):
-                found += _shapes(link.name, f"visual_{index}", visual, urdf, palette, problems, meshes)
+        own = [visual for visual in link.visuals if dress is None or not dress.replaces(link.name, visual.name)]
+        shapes = [
+            _shapes(link.name, f"visual_{index}", visual, urdf, palette, problems, meshes)
+            for index, visual in enumerate(own)
+        ]
+        found += [shape for drawn in shapes for shape in drawn]
+        missing = [visual for visual, drawn in zip(own, shapes, strict=True) if not drawn]
+        if missing and (stand_ins := _stand_ins(link, missing[0], urdf, palette, meshes)):
+            found += stand_ins
+            replaced.append(link.name)
     if dress is not None:
         found += _dressed(dress, robot, problems)
-    _warn(problems)
+    _warn(problems, replaced)
     return Appearance(visuals=tuple(_thinned(found)), attribution=dress.attribution if dress else "")
 
 
@@ -103,6 +112,23 @@ def _shapes(
         )
         for index, part in enumerate(parts)
     ]
+
+
+def _stand_ins(link: Any, visual: Any, urdf: Path, palette: Mapping[str, Any], meshes: bool) -> list[Visual]:
+    """Return the collision shapes of a link, in the colour that is stated for a visual of it that cannot be drawn.
+
+    Args:
+        link: as `parse_urdf` has it.
+        visual: that cannot be drawn.
+        urdf: the file, from which paths of meshes are relative.
+        palette: materials of the robot by name.
+        meshes: look for meshes at all.
+    """
+    found = []
+    for index, collision in enumerate(link.collisions, start=len(link.visuals)):
+        collision.material = visual.material
+        found += _shapes(link.name, f"visual_{index}", collision, urdf, palette, {}, meshes)
+    return found
 
 
 def _palette(robot: Any) -> dict[str, Any]:
@@ -156,9 +182,12 @@ def _thinned(visuals: list[Visual]) -> list[Visual]:
     return [visual if visual.part is None else replace(visual, part=next(parts)) for visual in visuals]
 
 
-def _warn(problems: Mapping[str, str]) -> None:
+def _warn(problems: Mapping[str, str], replaced: Sequence[str]) -> None:
+    """Warn of meshes that cannot be drawn, by their address, and say on which links collision shapes stand in."""
     if problems:
         named = "; ".join(f"'{uri}': {problem}" for uri, problem in list(problems.items())[:_NAMED])
         more = f"; and {len(problems) - _NAMED} more" if len(problems) > _NAMED else ""
         count = "1 mesh is" if len(problems) == 1 else f"{len(problems)} meshes are"
-        warnings.warn(f"{count} not drawn: {named}{more}", MeshWarning, stacklevel=2)
+        links = ("" if len(replaced) == 1 else "s") + f" {listed(replaced)}"
+        stand_in = f"; the collision shapes of the link{links} stand in" if replaced else ""
+        warnings.warn(f"{count} not drawn: {named}{more}{stand_in}", MeshWarning, stacklevel=2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from multimodal_to.arguments import checked
 from multimodal_to.auditing.findings import Finding
 from multimodal_to.reporting.published import PUBLISHED, PublishedRun
 from multimodal_to.reporting.reproduce import Run
@@ -124,6 +125,7 @@ Torque beyond effort is that of all joints by inverse dynamics; a negative one i
 base force is the force that inverse dynamics asks for at the base, where nothing pushes."""
 
 
+@checked
 def table(runs: Sequence[Run], columns: Sequence[Column]) -> ResultsTable:
     """Return a table of runs; below those that were solved here, the paper's and published files of that scenario.
 
@@ -150,6 +152,7 @@ def _of_file(run: Run, columns: Sequence[Column]) -> tuple[str, ...]:
     return (f"{run.name}, published file", *(column.of_run(run) for column in columns))
 
 
+@checked
 def markdown(runs: Sequence[Run]) -> str:
     """Return both tables as Markdown, each with what its columns mean: four paragraphs."""
     solves, audits = (table(runs, columns) for columns in (SOLVES, AUDITS))

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from multimodal_to.arguments import checked
 from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.auditing.findings import Finding
 from multimodal_to.files.writing import write_text
@@ -42,6 +43,7 @@ _CAPTIONS: Mapping[str, str] = {
 }
 
 
+@checked
 def write_report(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *, meshes: bool = True) -> Path:
     """Write the report of a motion as one page that opens from disk; whole or not at all.
 

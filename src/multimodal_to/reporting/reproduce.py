@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from multimodal_to.arguments import checked
 from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.errors import TrajectoryError
 from multimodal_to.models.robot import Robot
@@ -48,6 +49,7 @@ class Run(Value):
         return self.report.holds and self.solved
 
 
+@checked
 def reproduce(
     robot: Robot,
     scenario: Scenario,
@@ -81,6 +83,7 @@ def reproduce(
     )
 
 
+@checked
 def read_published(robot: Robot, folder: str | os.PathLike[str]) -> list[Run]:
     """Audit the published trajectories of a folder: every `.npz` in it, bare arrays as `import_arrays` reads them.
 
@@ -105,6 +108,7 @@ def read_published(robot: Robot, folder: str | os.PathLike[str]) -> list[Run]:
     return runs
 
 
+@checked
 def write_run(run: Run, folder: str | os.PathLike[str]) -> list[Path]:
     """Write trajectory, figures and report of a run into a folder that exists; return their paths.
 

@@ -7,16 +7,25 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
-from multimodal_to.errors import ScenarioError
+from multimodal_to.errors import ScenarioError, shown
 from multimodal_to.files.records import Records
-from multimodal_to.models.terrain import SURFACES, Surface
+from multimodal_to.models.terrain import SURFACES, FlatGround, Surface
 from multimodal_to.scenarios.scenario import Margins, Scenario, Vector3
 from multimodal_to.trajectory import Trajectory
 
 HEIGHTS = {"initial_com_height": "initial_com", "final_com_height": "final_com"}
 """Keys for the z of a CoM alone, where there is one to start from."""
+
+_CLASS = "class"
+"""Key for the name of a surface's class where that is all that a file says of it."""
+
+
+class OwnSurfaceError(ScenarioError):
+    """The ground of a motion is of a class that its file cannot hold."""
+
 
 RECORDS = Records(what="the scenario", error=ScenarioError, unions={Surface: SURFACES})
 
@@ -68,8 +77,23 @@ def _raised(height: Any, key: str, position: Any, com: str) -> Vector3:
 
 
 def to_json(scenario: Scenario) -> str:
-    """Return a scenario as the JSON text of its plain data."""
+    """Return a scenario as the JSON text of its plain data.
+
+    Raises:
+        ScenarioError: its surface is of a class that no file can name.
+    """
     return json.dumps(to_dict(scenario), ensure_ascii=False)
+
+
+def kept(scenario: Scenario) -> str:
+    """Return the text that a trajectory keeps of its scenario; of a surface of one's own class it is the class's name.
+
+    Such a scenario is not read again: `stored` refuses it.
+    """
+    if type(scenario.surface) in SURFACES.values():
+        return to_json(scenario)
+    table = to_dict(replace(scenario, surface=FlatGround()))
+    return json.dumps({**table, "surface": {_CLASS: type(scenario.surface).__name__}}, ensure_ascii=False)
 
 
 def stored(trajectory: Trajectory) -> Scenario | None:
@@ -78,12 +102,22 @@ def stored(trajectory: Trajectory) -> Scenario | None:
     A margin that the file does not state was not asked for: files of before the margins have none.
 
     Raises:
+        OwnSurfaceError: the ground is of a class of one's own.
         ScenarioError: what it keeps is no scenario of this release.
     """
     if not trajectory.scenario_json:
         return None
     try:
-        return from_dict(_with_margins(json.loads(trajectory.scenario_json)))
+        table = json.loads(trajectory.scenario_json)
+        surface = table.get("surface") if isinstance(table, dict) else None
+        if isinstance(surface, dict) and _CLASS in surface:
+            raise OwnSurfaceError(
+                f"the ground of '{trajectory.scenario}' is {shown(surface[_CLASS])}, a class of its author's own that "
+                "no file holds; in Python, `audit` takes it with the scenario"
+            )
+        return from_dict(_with_margins(table))
+    except OwnSurfaceError:
+        raise
     except (ValueError, RecursionError, ScenarioError) as error:
         raise ScenarioError(f"the scenario kept with '{trajectory.scenario}' cannot be read: {error}") from error
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from enum import Enum
 
-from multimodal_to.arguments import check_fields
+from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import ScenarioError, shown
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
@@ -205,6 +205,7 @@ class Scenario:
         self._check_positions()
         self._check_reach()
 
+    @checked
     def contact_bounds(self, robot: Robot) -> tuple[float, float]:
         """Return ε_n and ε_t [N m]; those that the scenario leaves open are `COMPLEMENTARITY` and `SLIDING` m g L."""
         unit = robot.weight * robot.standing_height

@@ -8,6 +8,8 @@ import numpy as np
 
 from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
+from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.simulation.model import SimulationModel, build_model, mujoco_module
 from multimodal_to.trajectory import Trajectory
@@ -24,6 +26,7 @@ class States:
     accelerations: Array  # ν̇, (6 + n, count)
 
 
+@checked
 def random_states(robot: Robot, count: int, seed: int = 0) -> States:
     """Return states all over the robot's range of joints, turned any way, with velocities and accelerations of 1.
 
@@ -31,7 +34,12 @@ def random_states(robot: Robot, count: int, seed: int = 0) -> States:
         robot: whose range of joints.
         count: how many.
         seed: of the random numbers; the same seed gives the same states.
+
+    Raises:
+        InputError: there is to be no state, or the seed is negative.
     """
+    if count < 1 or seed < 0:
+        raise InputError(f"{count} states of seed {seed}; expected at least one state and no negative seed")
     rng = np.random.default_rng(seed)
     limits, size = robot.joint_limits, 6 + len(robot.joint_names)
     turns = rng.normal(size=(4, count))
@@ -44,6 +52,7 @@ def random_states(robot: Robot, count: int, seed: int = 0) -> States:
     )
 
 
+@checked
 def states_along(trajectory: Trajectory) -> States:
     """Return the states of a trajectory's knots but the first, with backward differences as accelerations."""
     velocities = np.vstack(
@@ -58,6 +67,7 @@ def states_along(trajectory: Trajectory) -> States:
     )
 
 
+@checked
 def by_mujoco(simulation: SimulationModel, states: States) -> Array:
     """Return M ν̇ + C ν + g of each state, (6 + n, count): the wrench on the base in world axes, then the joints."""
     mujoco = mujoco_module()
@@ -83,6 +93,7 @@ def by_mujoco(simulation: SimulationModel, states: States) -> Array:
     return forces
 
 
+@checked
 def by_rnea(robot: Robot, states: States) -> Array:
     """Return the same as `by_mujoco` by this library."""
     rho = states.quaternions_xyzw / np.linalg.norm(states.quaternions_xyzw, axis=0)
@@ -98,6 +109,7 @@ def by_rnea(robot: Robot, states: States) -> Array:
     )
 
 
+@checked
 def disagreement(robot: Robot, states: States) -> float:
     """Return the largest difference between the two, as a share of the largest force of its state."""
     ours, theirs = by_rnea(robot, states), by_mujoco(build_model(robot), states)

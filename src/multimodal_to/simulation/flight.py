@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multimodal_to.arguments import check_fields, checked, vector
 from multimodal_to.errors import InputError, TrajectoryError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
@@ -30,6 +31,8 @@ class Push:
     duration: float  # [s]
 
     def __post_init__(self) -> None:
+        check_fields(self, what="the push's ")
+        vector("the push's force", self.force, 3)
         if not (np.isfinite([*self.force, self.start, self.duration]).all() and self.duration > 0.0):
             raise InputError(f"the push is {self}; expected finite numbers and a duration above zero")
 
@@ -48,6 +51,7 @@ class Flight:
         TrajectoryError: the plan is not one of this robot with these jets.
     """
 
+    @checked
     def __init__(self, robot: Robot, plan: Trajectory, *, push: Push | None = None, torque_limits: bool = True) -> None:
         refuse_other_robot(plan, robot, what="the plan", error=TrajectoryError)
         simulation, friction = stage(robot, plan, torque_limits)
@@ -75,6 +79,7 @@ class Flight:
         """Return what the simulation has done; its `plan` is the first one, its `reference` what was followed."""
         return self._player.playback()
 
+    @checked
     def follow(self, plan: Trajectory, since: float) -> None:
         """Follow another plan from now on.
 
@@ -88,6 +93,7 @@ class Flight:
         refuse_other_robot(plan, self._robot, what="the plan", error=TrajectoryError)
         self._plan, self._since = plan, since
 
+    @checked
     def advance(self, duration: float) -> None:
         """Simulate for some time [s], to the nearest step of the simulation; after a plan's end it is held there.
 

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from multimodal_to.adam.spatial import Array, Inertia
 from multimodal_to.adam.tree import Joint, Link, Tree
 from multimodal_to.adam.urdf import read_urdf
-from multimodal_to.errors import ModelError, OutputError, listed, said
+from multimodal_to.arguments import checked, vector
+from multimodal_to.errors import InputError, ModelError, OutputError, listed, said
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Plane, Surface, frame_function, heights_below
 
@@ -74,6 +75,7 @@ class SimulationModel:
     jets: NDArray[np.int64]  # site of each jet, (jets,)
     notes: tuple[str, ...]  # what differs from the URDF, a sentence each
 
+    @checked
     def set_state(
         self,
         data: Any,
@@ -106,6 +108,7 @@ class SimulationModel:
         return {name: values[name] for name in (*tree.joint_names, *tree.followers)}
 
 
+@checked
 def build_model(
     robot: Robot,
     surface: Surface | None = None,
@@ -126,9 +129,16 @@ def build_model(
         torque_limits: clip what the servo of a joint gives at the joint's effort limit.
 
     Raises:
+        InputError: the friction, the reach or the middle is no number that the ground can have.
         OutputError: MuJoCo is not installed.
         ModelError: MuJoCo refuses the robot, for example because of an inertia that no body can have.
     """
+    if friction is not None and not 0.0 <= friction < np.inf:
+        raise InputError(f"the ground's friction is {friction}; expected a finite number of at least zero")
+    if not 0.0 < reach < np.inf:
+        raise InputError(f"the ground's reach is {reach} m; expected a positive finite number")
+    if middle is not None:
+        vector("the middle of the ground", middle, 2)
     mujoco = mujoco_module()
     spec = mujoco.MjSpec()
     spec.option.gravity = robot.gravity

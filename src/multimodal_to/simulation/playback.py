@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, TrajectoryError
 from multimodal_to.models.jet import Jet
 from multimodal_to.models.robot import Robot
@@ -61,6 +62,7 @@ class Playback(Value):
     fell: float | None  # when [s]
 
 
+@checked
 def play(
     robot: Robot, plan: Trajectory, *, stabilise: bool = True, delay: float = 0.0, torque_limits: bool = True
 ) -> Playback:
@@ -92,6 +94,7 @@ def play(
     return player.playback()
 
 
+@checked
 def stage(robot: Robot, plan: Trajectory, torque_limits: bool) -> tuple[SimulationModel, float]:
     """Return a robot on the ground of the scenario that a plan keeps, and its friction [1].
 

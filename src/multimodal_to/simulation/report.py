@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.models.joint_units import slides
 from multimodal_to.models.robot import Robot
 from multimodal_to.simulation.model import TIME_STEP
@@ -70,6 +71,7 @@ class Tracking:
         return max((torque.beyond for torque in self.torques), default=0.0)
 
 
+@checked
 def tracking(playback: Playback) -> Tracking:
     """Return the errors of a playback."""
     plan, robot, reference = playback.plan, playback.robot, playback.reference
@@ -184,6 +186,7 @@ def _edges(times: Array, stands: Array) -> list[tuple[float, bool]]:
     return [(float(times[edge]), bool(stands[edge])) for edge in kept]
 
 
+@checked
 def simulated_trajectory(playback: Playback) -> Trajectory:
     """Return the motion at the instants of the plan, under the plan's scenario and rule, to be drawn beside it.
 

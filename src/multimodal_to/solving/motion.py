@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.models.terrain import SURFACES
 from multimodal_to.ocp.problem import Problem
-from multimodal_to.scenarios.data import to_json
-from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.scenarios.data import kept
 from multimodal_to.trajectory import Trajectory, conditions
 
 
@@ -32,7 +30,7 @@ def motion(problem: Problem, x: Array, solve_json: str = "") -> Trajectory:
     return Trajectory(
         robot=robot.name,
         scenario=problem.scenario.name,
-        scenario_json=_kept(problem.scenario),
+        scenario_json=kept(problem.scenario),
         solve_json=solve_json,
         robot_json=conditions.to_json(robot),
         rule=problem.formulation.rule.name,
@@ -46,8 +44,3 @@ def motion(problem: Problem, x: Array, solve_json: str = "") -> Trajectory:
         thrust_acceleration=rate("thrust_rate"),
         **values,
     )
-
-
-def _kept(scenario: Scenario) -> str:
-    """Return the scenario as text; a surface of the user's own class cannot be written, and nothing is kept."""
-    return to_json(scenario) if type(scenario.surface) in SURFACES.values() else ""

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.state import State
@@ -45,6 +46,7 @@ class Planner:
         FormulationError: a term does not return what it has to, or is not a number at the start guess.
     """
 
+    @checked
     def __init__(
         self,
         robot: Robot,
@@ -66,6 +68,7 @@ class Planner:
         """Return the problem as it was solved last."""
         return self._problem
 
+    @checked
     def solve(
         self,
         *,

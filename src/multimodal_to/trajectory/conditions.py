@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from multimodal_to.arguments import checked
 from multimodal_to.errors import TrajectoryError, shown
 from multimodal_to.files.reading import is_number
 from multimodal_to.models.robot import Robot
@@ -23,11 +24,13 @@ _SAME = 1e-9
 """Numbers that differ by less than this share are the same [1]."""
 
 
+@checked
 def to_json(robot: Robot) -> str:
     """Return what of a robot an answer depends on, as the JSON text that a trajectory keeps in `robot_json`."""
     return json.dumps(_facts(robot), ensure_ascii=False, allow_nan=False)
 
 
+@checked
 def under_conditions(robot: Robot, trajectory: Trajectory) -> Robot:
     """Return the robot under the gravity and with the friction that a trajectory keeps; as it is where it keeps none.
 
@@ -45,6 +48,7 @@ def under_conditions(robot: Robot, trajectory: Trajectory) -> Robot:
     return replace(robot.with_gravity(gravity), friction=float(friction))
 
 
+@checked
 def differences(robot: Robot, trajectory: Trajectory) -> tuple[str, ...]:
     """Return in words how a robot differs from the one that a trajectory was planned for, beside gravity and friction.
 

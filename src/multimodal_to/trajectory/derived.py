@@ -12,6 +12,8 @@ import numpy as np
 
 from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import Array, homogeneous
+from multimodal_to.arguments import checked
+from multimodal_to.errors import InputError, unknown
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import Surface, frame_function
 from multimodal_to.trajectory import rules
@@ -46,21 +48,25 @@ class Footstep:
     lift: float  # greatest height of the lowest contact point [m]
 
 
+@checked
 def flight_force(robot: Robot) -> float:
     """Return below which total vertical contact force the robot counts as flying [N]: `FLIGHT_SHARE` of its weight."""
     return FLIGHT_SHARE * robot.weight
 
 
+@checked
 def loaded_force(robot: Robot) -> float:
     """Return above which normal force a contact point carries load [N]: `LOADED_SHARE` of its share of the weight."""
     return LOADED_SHARE * robot.weight / max(len(robot.contacts), 1)
 
 
+@checked
 def step_lift(robot: Robot) -> float:
     """Return how far off the ground a foot has to be to have stepped [m]: `LIFT_SHARE` of the standing height."""
     return LIFT_SHARE * robot.standing_height
 
 
+@checked
 def step_length(robot: Robot) -> float:
     """Return how far from where it stood a foot has to come down to have stepped [m]: `LENGTH_SHARE` of the height."""
     return LENGTH_SHARE * robot.standing_height
@@ -82,6 +88,7 @@ class LargestTorque:
         return self.torque / self.effort
 
 
+@checked
 def base_poses(trajectory: Trajectory) -> Array:
     """Return w_H_base at every knot, (knots + 1, 4, 4); quaternions are normalised first."""
     position, rho = cs.MX.sym("p", 3), cs.MX.sym("rho", 4)
@@ -90,6 +97,7 @@ def base_poses(trajectory: Trajectory) -> Array:
     return _stacked(function(trajectory.base_position, trajectory.base_quaternion_xyzw))
 
 
+@checked
 def frame_poses(robot: Robot, trajectory: Trajectory, frame: str) -> Array:
     """Return w_H_frame, the world pose of a link or frame at every knot, (knots + 1, 4, 4).
 
@@ -108,12 +116,14 @@ def _stacked(side_by_side: cs.DM) -> Array:
     return np.array(side_by_side).reshape(4, -1, 4).transpose(1, 0, 2)
 
 
+@checked
 def contact_points(robot: Robot, trajectory: Trajectory) -> Array:
     """Return the contact points by forward kinematics [m], (contacts, knots + 1, 3)."""
     points = [frame_poses(robot, trajectory, name)[:, :3, 3] for name in trajectory.contact_names]
     return np.array(points).reshape(-1, trajectory.time.size, 3)
 
 
+@checked
 def surface_frames(surface: Surface, points: Array) -> tuple[Array, Array, Array]:
     """Return d (...), n (..., 3) and t (..., 3, 2) of a surface at points (..., 3)."""
     shape, count = points.shape[:-1], math.prod(points.shape[:-1])
@@ -123,6 +133,7 @@ def surface_frames(surface: Surface, points: Array) -> tuple[Array, Array, Array
     return d.reshape(shape), n.T.reshape(*shape, 3), t.reshape(3, count, 2).transpose(1, 0, 2).reshape(*shape, 3, 2)
 
 
+@checked
 def acting_times(trajectory: Trajectory) -> tuple[Array, Array]:
     """Return from when to when the contact forces and throttles of each column act [s], (knots + 1,) each.
 
@@ -134,6 +145,7 @@ def acting_times(trajectory: Trajectory) -> tuple[Array, Array]:
     return time - (1.0 - after) * before, time + after * np.append(before[1:], 0.0)
 
 
+@checked
 def greatest_while_acting(values: Array, rule: str, *, of_intervals: bool = False) -> Array:
     """Return the greatest value of the knots, or of the intervals, that the contact force of each column reaches.
 
@@ -154,6 +166,7 @@ def greatest_while_acting(values: Array, rule: str, *, of_intervals: bool = Fals
     return np.asarray(found)
 
 
+@checked
 def contact_products(robot: Robot, trajectory: Trajectory, surface: Surface) -> tuple[Array, Array]:
     """Return what complementarity bounds [N m], (contacts, knots + 1) each: height and slip, times the normal force.
 
@@ -174,6 +187,7 @@ def contact_products(robot: Robot, trajectory: Trajectory, surface: Surface) -> 
     return heights * normal, greatest_while_acting(slips, trajectory.rule, of_intervals=True) * normal
 
 
+@checked
 def thrust_forces(robot: Robot, trajectory: Trajectory) -> tuple[Array, Array]:
     """Return where each jet pushes [m] and with what force [N], (jets, knots + 1, 3) each, world axes."""
     jets = robot.with_jets(trajectory.jet_names).jets
@@ -183,11 +197,13 @@ def thrust_forces(robot: Robot, trajectory: Trajectory) -> tuple[Array, Array]:
     return points, -trajectory.thrust[:, :, None] * axes
 
 
+@checked
 def vertical_thrust(robot: Robot, trajectory: Trajectory) -> Array:
     """Return the world-vertical sum of the thrusts [N], (knots + 1,)."""
     return np.asarray(thrust_forces(robot, trajectory)[1][:, :, 2].sum(axis=0))
 
 
+@checked
 def flying(robot: Robot, trajectory: Trajectory) -> np.ndarray:
     """Return in which columns the total vertical contact force is below `flight_force`, (knots + 1,).
 
@@ -200,6 +216,7 @@ def flying(robot: Robot, trajectory: Trajectory) -> np.ndarray:
     return trajectory.vertical_contact_force() < flight_force(robot)
 
 
+@checked
 def footsteps(robot: Robot, trajectory: Trajectory, surface: Surface) -> list[Footstep]:
     """Return the steps in the order in which they start.
 
@@ -231,6 +248,7 @@ def footsteps(robot: Robot, trajectory: Trajectory, surface: Surface) -> list[Fo
     return sorted(steps, key=lambda step: step.lift_off)
 
 
+@checked
 def flight_phases(robot: Robot, trajectory: Trajectory) -> list[tuple[float, float]]:
     """Return start and end [s] of each run of columns in flight.
 
@@ -254,6 +272,7 @@ def _bounds_of_columns(trajectory: Trajectory) -> tuple[Array, Array]:
     return acting_times(trajectory)
 
 
+@checked
 def spans(chosen: np.ndarray, begins: Array, ends: Array) -> list[tuple[float, float]]:
     """Return start and end [s] of each run of chosen columns.
 
@@ -267,13 +286,19 @@ def spans(chosen: np.ndarray, begins: Array, ends: Array) -> list[tuple[float, f
     return [(float(begins[i]), float(ends[j])) for i, j in zip(first, last, strict=True)]
 
 
+@checked
 def at_knots(trajectory: Trajectory, name: str) -> Array:
     """Return a quantity at the instants of the knots, (rows, knots + 1).
 
     Where a quantity is in the middles of intervals, two of these meet at a knot, and it is the mean of theirs; an
     acceleration is that between them. After the last knot there is no interval: there it is that of the last one, and
     an acceleration is zero.
+
+    Raises:
+        InputError: there is no such quantity.
     """
+    if name not in QUANTITIES:
+        raise InputError(unknown("quantity", name, QUANTITIES))
     values: Array = getattr(trajectory, name)
     before = rules.instant(trajectory.rule, name)
     if not before:
@@ -283,6 +308,7 @@ def at_knots(trajectory: Trajectory, name: str) -> Array:
     return np.hstack([values[:, 1:], np.zeros_like(values[:, -1:])])
 
 
+@checked
 def sampled(trajectory: Trajectory) -> Trajectory:
     """Return the trajectory with every quantity at the instant of its knot, as `at_knots` has it."""
     if rules.all_at_knots(trajectory.rule):
@@ -291,6 +317,7 @@ def sampled(trajectory: Trajectory) -> Trajectory:
     return replace(trajectory, rule=rules.SAMPLED, **arrays)
 
 
+@checked
 def accelerations_at_knots(trajectory: Trajectory, name: str) -> Array:
     """Return the rate of a velocity or a momentum at the instants of the knots, (rows, knots + 1).
 
@@ -303,6 +330,7 @@ def accelerations_at_knots(trajectory: Trajectory, name: str) -> Array:
     return np.hstack([rates, nothing] if rules.instant(trajectory.rule, name) else [nothing, rates])
 
 
+@checked
 def at_velocities(trajectory: Trajectory) -> Trajectory:
     """Return the trajectory with the configurations at the instants of its velocities."""
     if not rules.instant(trajectory.rule, "joint_velocities"):
@@ -313,6 +341,7 @@ def at_velocities(trajectory: Trajectory) -> Trajectory:
     return replace(trajectory, **{name: getattr(middle, name) for name in names})
 
 
+@checked
 def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
     """Return what the motion asks of base and joints under all contact forces and thrusts, (6 + n, knots + 1).
 
@@ -360,6 +389,7 @@ def _velocity_products(robot: Robot, trajectory: Trajectory, velocities: Array) 
     return np.asarray(moving - still)
 
 
+@checked
 def joint_torques(robot: Robot, trajectory: Trajectory) -> Array:
     """Return the torques of the joints' motors by inverse dynamics [N m], forces [N] of prismatic ones, (n, knots + 1).
 
@@ -369,6 +399,7 @@ def joint_torques(robot: Robot, trajectory: Trajectory) -> Array:
     return generalised_forces(robot, trajectory)[6:]
 
 
+@checked
 def without_acceleration(trajectory: Trajectory) -> int:
     """Return the index of the knot whose acceleration the trajectory does not tell: the first, 0, or the last, −1.
 
@@ -377,6 +408,7 @@ def without_acceleration(trajectory: Trajectory) -> int:
     return -1 if rules.instant(trajectory.rule, "joint_velocities") else 0
 
 
+@checked
 def largest_torques(robot: Robot, trajectory: Trajectory) -> tuple[LargestTorque, ...]:
     """Return the largest torque of every joint along a motion; the first one is the nearest to its effort limit.
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from multimodal_to.arguments import checked
 from multimodal_to.errors import TrajectoryError, shown
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing
@@ -20,6 +21,7 @@ COMPUTED = ("contact_positions",)
 """What bare arrays need not hold: it follows from the others."""
 
 
+@checked
 def import_arrays(robot: Robot, path: str | os.PathLike[str]) -> Trajectory:
     """Read an `.npz` of bare arrays for a robot.
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.models.joint_units import joint_units
 from multimodal_to.models.robot import Robot
@@ -92,6 +93,7 @@ QUANTITIES: Mapping[str, Quantity] = FrozenMapping(
 """The arrays of a `Trajectory` by name; each is (rows × bodies, knots + 1)."""
 
 
+@checked
 def labels(name: str, bodies: Bodies, *, separator: str = " ") -> tuple[str, ...]:
     """Return what the rows of a quantity are called, such as `l_knee`, `l_sole_1 z`, `left arm`, or `x` of the CoM.
 
@@ -108,6 +110,7 @@ def labels(name: str, bodies: Bodies, *, separator: str = " ") -> tuple[str, ...
     return row_labels(bodies, QUANTITIES[name].of, QUANTITIES[name].axes, separator=separator)
 
 
+@checked
 def row_units(quantity: Quantity, robot: Robot, count: int | None = None) -> tuple[str, ...]:
     """Return the unit of each row of a quantity: that of a joint goes by whether it turns or slides.
 
@@ -122,6 +125,7 @@ def row_units(quantity: Quantity, robot: Robot, count: int | None = None) -> tup
     return (quantity.unit,) * (quantity.rows * bodies[quantity.of] if count is None else count)
 
 
+@checked
 def row_labels(bodies: Bodies, of: str, axes: Sequence[str], *, separator: str = " ") -> tuple[str, ...]:
     """Return what rows are called that are repeated for each body: body and axis, as far as they have a name.
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import InputError
+from multimodal_to.arguments import checked, vector
+from multimodal_to.errors import InputError, unknown
 from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.quantities import QUANTITIES
 from multimodal_to.trajectory.trajectory import Trajectory
 
 
-def resample(trajectory: Trajectory, times: Array) -> Trajectory:
+@checked
+def resample(trajectory: Trajectory, times: Sequence[float] | Array) -> Trajectory:
     """Return the trajectory at other times [s], on its grid or between: linear, and the shortest turn of the base.
 
     Between the instants of two columns, at the share a of the time between them, a quantity is (1 − a) y_k + a y_k+1,
@@ -23,7 +26,7 @@ def resample(trajectory: Trajectory, times: Array) -> Trajectory:
     Raises:
         InputError: a time is not within the trajectory.
     """
-    wanted, grid = np.asarray(times, dtype=float), trajectory.time
+    wanted, grid = vector("the times", times, None), trajectory.time
     if wanted.size and not (grid[0] <= wanted.min() and wanted.max() <= grid[-1]):
         raise InputError(f"times from {wanted.min():g} to {wanted.max():g} s; expected {grid[0]:g} to {grid[-1]:g} s")
     arrays: dict[str, Any] = {name: at_times(trajectory, name, wanted) for name in QUANTITIES}
@@ -31,6 +34,7 @@ def resample(trajectory: Trajectory, times: Array) -> Trajectory:
     return replace(trajectory, time=wanted, rule=rule, **arrays)
 
 
+@checked
 def regrid(trajectory: Trajectory, knots: int, rule: str) -> Trajectory:
     """Return the trajectory on equal intervals, with every quantity at the instant that a rule wants.
 
@@ -38,12 +42,18 @@ def regrid(trajectory: Trajectory, knots: int, rule: str) -> Trajectory:
         trajectory: of any rule.
         knots: N, the number of intervals.
         rule: name of the integration rule.
+
+    Raises:
+        InputError: there is to be no interval.
     """
+    if knots < 1:
+        raise InputError(f"the number of intervals is {knots}; expected at least one")
     grid = np.linspace(trajectory.time[0], trajectory.time[-1], knots + 1)
     arrays: dict[str, Any] = {name: at_times(trajectory, name, rules.instants(grid, rule, name)) for name in QUANTITIES}
     return replace(trajectory, time=grid, rule=rule, **arrays)
 
 
+@checked
 def at_times(trajectory: Trajectory, name: str, times: Array) -> Array:
     """Return a quantity at times [s]; before its first instant and after its last it is what it is there.
 
@@ -51,7 +61,12 @@ def at_times(trajectory: Trajectory, name: str, times: Array) -> Array:
         trajectory: of any rule.
         name: of the quantity.
         times: wanted [s].
+
+    Raises:
+        InputError: there is no such quantity.
     """
+    if name not in QUANTITIES:
+        raise InputError(unknown("quantity", name, QUANTITIES))
     values = getattr(trajectory, name)
     own = trajectory.times(name)
     wanted = np.clip(times, own[0], own[-1])

@@ -6,12 +6,14 @@ from dataclasses import fields
 
 import numpy as np
 
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError
 from multimodal_to.models.state import State
 from multimodal_to.trajectory.resampling import at_times
 from multimodal_to.trajectory.trajectory import Trajectory
 
 
+@checked
 def state_at(trajectory: Trajectory, time: float) -> State:
     """Return the state at a time of a motion [s], on its grid or between; `trajectory.time[k]` is that of knot k.
 
