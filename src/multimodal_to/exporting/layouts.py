@@ -233,13 +233,13 @@ def _of_mujoco(path: Path, order: str) -> tuple[Layout, Placing]:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise ModelError(f"MuJoCo cannot read '{path}': {said(error)}") from error
-    free = [index for index in range(model.njnt) if model.jnt_type[index] == mujoco.mjtJoint.mjJNT_FREE]
+    free = [index for index in range(model.njnt) if model.jnt_type[index] == int(mujoco.mjtJoint.mjJNT_FREE)]
     root = int(model.jnt_bodyid[free[0]]) if free else 1
     bodies = [index for index in range(model.nbody) if index and model.body_rootid[index] == model.body_rootid[root]]
     if order == "isaac":
         bodies.sort(key=lambda index: _depth(model, index))  # a sort keeps the order of those that are as deep
     joints = [index for body in bodies for index in range(model.njnt) if model.jnt_bodyid[index] == body]
-    kinds = {mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE}
+    kinds = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
     own = [index for index in joints if index not in free]
     if others := [model.joint(index).name for index in own if model.jnt_type[index] not in kinds]:
         raise ModelError(f"'{path}' has joints that neither turn nor slide: {listed(others)}")

@@ -133,8 +133,9 @@ def _write_locomujoco(frames: Frames, path: Path) -> None:
     qpos, qvel = _coordinates(frames)
     positions, quaternions_wxyz = frames.body_positions, frames.body_quaternions_xyzw[..., _WXYZ]
     count, robot, motion = motion_count(frames), frames.robot, frames.motion
-    com = motion.com_position.T[:, None, :]
-    cvel = np.concatenate([frames.body_velocities[..., 3:], frames.at(np.broadcast_to(com, positions.shape))], axis=2)
+    coms = _subtree_coms(frames)  # MuJoCo's velocities are those at the CoM of all, which is the world's
+    about = frames.at(np.broadcast_to(coms[:, :1], positions.shape))
+    cvel = np.concatenate([frames.body_velocities[..., 3:], about], axis=2)
     world = np.zeros((count, 1, 3))
     upright = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1, 1))
     sites = {**{name: name for name in robot.contact_names}, **{jet.name: jet.frame for jet in robot.jets}}
@@ -146,7 +147,7 @@ def _write_locomujoco(frames: Frames, path: Path) -> None:
         "xpos": np.concatenate([world, positions], axis=1),
         "xquat": np.concatenate([upright, quaternions_wxyz], axis=1),
         "cvel": np.concatenate([np.zeros((count, 1, 6)), cvel], axis=1),
-        "subtree_com": _subtree_coms(frames),
+        "subtree_com": coms,
         "site_xpos": poses[:, :, :3, 3].transpose(1, 0, 2),
         "site_xmat": poses[:, :, :3, :3].reshape(-1, count, 9).transpose(1, 0, 2),
         "split_points": np.array([0, count]),
