@@ -25,9 +25,9 @@ from multimodal_to.trajectory.archive import LARGEST_CONTENT, numbers, read_arch
 from multimodal_to.trajectory.derived import base_poses, contact_points, frame_poses
 from multimodal_to.trajectory.smoothing import product, rotation_vectors
 
-APART = 1e-3
-"""A body of a file is where the robot has it, up to this share of the robot's height L, and this angle [rad]: files of
-single precision, made with models of a few digits, are within it."""
+APART = 0.03
+"""A body of a file is where the robot has it, up to this share of the robot's height L, and this angle [rad]: files from
+motion capture are smoothed, and made with another edition of the robot, by half of that."""
 _XYZW = [1, 2, 3, 0]
 """Where x y z w stand in w x y z."""
 _BODIES = ("body_pos_w", "body_quat_w", "body_lin_vel_w", "body_ang_vel_w")
@@ -294,14 +294,23 @@ def _refuse_other_joints(found: _Motion, robot: Robot, source: Path) -> None:
 
 
 def _refuse_shuffled(found: _Motion, robot: Robot, source: Path) -> None:
-    """Name the body of a file that is farthest from where forward kinematics of the file's joints has it."""
+    """Name the body of a file that is farthest from where forward kinematics of the file's joints has it.
+
+    Bodies that the robot does not have, as those of a hand or of what it carries, are passed over.
+
+    Args:
+        found: in the file.
+        robot: whose motion it should be.
+        source: the file.
+    """
     if not found.bodies:
         return
     posed = _bare(robot, found, source)
-    if strangers := [name for name in found.bodies if name not in robot.kindyn.frame_names]:
-        raise TrajectoryError(f"'{source}' has bodies that {robot.name} does not have: {listed(strangers)}")
+    known = {name: placed for name, placed in found.bodies.items() if name in robot.kindyn.frame_names}
+    if not known:
+        raise TrajectoryError(f"'{source}' has no body of {robot.name}: {listed(found.bodies)}")
     worst: tuple[float, str, int] = (0.0, "", 0)
-    for name, (positions, quaternions) in found.bodies.items():
+    for name, (positions, quaternions) in known.items():
         ours = frame_poses(robot, posed, name)
         away = np.linalg.norm(positions - ours[:, :3, 3], axis=1) / robot.standing_height
         turned = np.linalg.norm(_rotations(quaternions) - ours[:, :3, :3], axis=(1, 2)) / np.sqrt(2.0)
