@@ -26,7 +26,7 @@ from multimodal_to.trajectory.derived import base_poses, contact_points, frame_p
 from multimodal_to.trajectory.smoothing import product, rotation_vectors
 
 APART = 0.03
-"""A body of a file is where the robot has it, up to this share of the robot's height L, and this angle [rad]: files from
+"""A body of a file is where the robot has it, up to this share of its height L, and this angle [rad]: files from
 motion capture are smoothed, and made with another edition of the robot, by half of that."""
 _XYZW = [1, 2, 3, 0]
 """Where x y z w stand in w x y z."""
