@@ -50,6 +50,7 @@ from multimodal_to.solving import (
     relax,
     solve,
 )
+from multimodal_to.sweeping import sweep
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.states import state_at
 
@@ -101,5 +102,6 @@ __all__ = [
     "scenarios",
     "solve",
     "state_at",
+    "sweep",
     "write_motion",
 ]
