@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass
-from functools import cache
-from importlib import metadata
 from pathlib import Path
 
 import casadi as cs
@@ -13,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from multimodal_to.adam import GRAVITY, KinDynComputations, Representations, Tree, quaternion
+from places import example_robots
 
 IRONCUB = Path(__file__).parents[1] / "robots" / "ironcub"
 BODY = Representations.BODY_FIXED_REPRESENTATION
@@ -22,17 +21,6 @@ INERTIAL = Representations.INERTIAL_FIXED_REPRESENTATION
 
 def ironcub_joints() -> list[str]:
     return list(tomllib.loads((IRONCUB / "robot.toml").read_text(encoding="utf-8"))["joints"])
-
-
-@cache
-def example_robots() -> Path:
-    """Return the folder of `example-robot-data`, from the list of files of its package."""
-    for file in metadata.files("example-robot-data") or []:
-        parts = file.parts
-        if "robots" in parts and parts[parts.index("robots") - 1] == "example-robot-data":
-            path = Path(str(metadata.distribution("example-robot-data").locate_file(file))).resolve()
-            return Path(*path.parts[: path.parts.index("robots", path.parts.index("example-robot-data")) + 1])
-    raise FileNotFoundError("example-robot-data holds no robots")
 
 
 def random_rotation(rng: np.random.Generator) -> np.ndarray:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from adam_robots import example_robots
 from multimodal_to.models.robot import Robot, load_robot
+from places import example_robots
 
 LEGS = ("FL", "FR", "HL", "HR")
 HOME = {"HAA": 0.0, "HFE": 0.8, "KFE": -1.6}

@@ -29,7 +29,7 @@ def take_off(robot: Robot) -> Trajectory:
     arrays["base_quaternion_xyzw"][2:] = np.sin(yaw / 2), np.cos(yaw / 2)
     arrays["joint_positions"][:] = 0.3 + 0.2 * np.sin(3.0 * flown)
     arrays["com_position"][:] = arrays["base_position"] + [[-0.02], [0.0], [0.06]]
-    arrays["thrust"][:] = handed_over * [[0.6 * jet.thrust_max] for jet in robot.jets]
+    arrays["thrust"][:] = handed_over * np.array([0.6 * jet.thrust_max for jet in robot.jets]).reshape(-1, 1)
     arrays["throttle"][:] = 60.0 * handed_over
     forces = arrays["contact_forces"].reshape(len(robot.contact_names), 3, -1)
     forces[:, 0] = 0.2 * robot.weight / len(forces) * (1.0 - handed_over)

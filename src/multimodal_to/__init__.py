@@ -15,6 +15,8 @@ from multimodal_to.adam import KinDynComputations
 from multimodal_to.auditing import Audit, audit
 from multimodal_to.doctor import Diagnosis, doctor
 from multimodal_to.errors import MultimodalError
+from multimodal_to.exporting.motion import write_motion
+from multimodal_to.exporting.reading import read_motion
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.models.state import State
@@ -48,6 +50,7 @@ from multimodal_to.solving import (
     relax,
     solve,
 )
+from multimodal_to.sweeping import sweep
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.states import state_at
 
@@ -93,9 +96,12 @@ __all__ = [
     "doctor",
     "equal",
     "load_robot",
+    "read_motion",
     "relax",
     "scenario_files",
     "scenarios",
     "solve",
     "state_at",
+    "sweep",
+    "write_motion",
 ]

@@ -146,7 +146,7 @@ def completions(line, folder):
         ("multimodal-to solve jump --linear-solver m", ["mumps", "ma27", "ma57", "ma77", "ma86", "ma97"]),
         ("multimodal-to reproduce take-off st", ["step-up"]),
         ("multimodal-to plot a.npz --figure m", ["momentum", "margins"]),
-        ("multimodal-to export a.npz --to m", ["mat", "mujoco"]),
+        ("multimodal-to export a.npz --to m", ["mat", "mujoco", "motion"]),
         ("multimodal-to robot info i", ["ironcub"]),
         ("multimodal-to audit a.npz --robot r", ["robots/"]),
     ],

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from adam_robots import example_robots
 from multimodal_to import replay
 from multimodal_to.adam import KinDynComputations
 from multimodal_to.adam.urdf import parse_urdf
@@ -21,6 +20,7 @@ from multimodal_to.replay.meshes import Part, find_mesh, load_parts, package_fil
 from multimodal_to.replay.visuals import FACES, appearance
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 from multimodal_to.trajectory.derived import frame_poses
+from places import example_robots
 
 IRONCUB = Path(__file__).parents[2] / "robots" / "ironcub"
 VISUAL = '<visual><geometry><mesh filename="{}" scale="{}"/></geometry></visual>'

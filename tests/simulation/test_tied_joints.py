@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adam_robots import example_robots
 from hopper import hopper
 from multimodal_to.errors import ModelError
 from multimodal_to.models.robot import load_robot
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.simulation import build_model, disagreement, play, random_states
+from places import example_robots
 from synthetic import take_off
 from tied_hopper import tied_hopper
 

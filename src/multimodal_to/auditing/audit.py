@@ -41,6 +41,18 @@ from multimodal_to.trajectory.derived import (
 )
 from multimodal_to.trajectory.sameness import refuse_other_robot
 
+KINEMATIC = (
+    "CoM consistency",
+    "momentum consistency",
+    "contact point consistency",
+    "quaternion norm",
+    "penetration",
+    "joint range",
+    "joint speed",
+    "link distance",
+)
+"""The properties that need no force, thrust or throttle: what can be said of a motion from anywhere."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Audit:
@@ -72,7 +84,7 @@ class Audit:
 
 
 @checked
-def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None) -> Audit:
+def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None, *, kinematic: bool = False) -> Audit:
     """Check a trajectory against the physics of its robot.
 
     Gravity and the robot's friction are those that the trajectory keeps; where it keeps none, the robot's.
@@ -82,6 +94,7 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         trajectory: as loaded from its file.
         scenario: what was asked, with its terrain and friction; by default the one that the trajectory keeps. If it
             keeps none, the ground is taken as flat at height zero, with the robot's own friction as a pyramid.
+        kinematic: judge only what needs no force: `KINEMATIC`, for motions that are no plans.
 
     Raises:
         InputError: the trajectory is for another robot, or the scenario allows more of a property that is not judged.
@@ -91,7 +104,21 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
     scenario = scenario or stored(trajectory)
     phases = flight_phases(robot, trajectory)
     motion = Motion.of(robot, trajectory)
-    worst = (
+    worst = _of_postures(motion, scenario) if kinematic else _of_all(motion, scenario)
+    findings = _findings(worst, motion, scenario)
+    return Audit(
+        findings=findings,
+        scenario=scenario,
+        duration=trajectory.duration,
+        airborne=max((end - start for start, end in phases), default=0.0),
+        final_thrust_over_weight=float(motion.thrusts[:, -1, 2].sum() / robot.weight),
+        allowances_used=tuple(entry.name for entry in findings if entry.holds and not _within(entry, motion, scenario)),
+    )
+
+
+def _of_all(motion: Motion, scenario: Scenario | None) -> tuple[Worst, ...]:
+    robot, trajectory = motion.robot, motion.trajectory
+    return (
         *_kinematics(motion),
         *_dynamics(motion),
         *_torques(motion),
@@ -105,15 +132,18 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         *margin_findings(motion, scenario),
         *(task_findings(motion, scenario) if scenario else ()),
     )
-    findings = _findings(worst, motion, scenario)
-    return Audit(
-        findings=findings,
-        scenario=scenario,
-        duration=trajectory.duration,
-        airborne=max((end - start for start, end in phases), default=0.0),
-        final_thrust_over_weight=float(motion.thrusts[:, -1, 2].sum() / robot.weight),
-        allowances_used=tuple(entry.name for entry in findings if entry.holds and not _within(entry, motion, scenario)),
+
+
+def _of_postures(motion: Motion, scenario: Scenario | None) -> tuple[Worst, ...]:
+    """Return the worst values of `KINEMATIC`: whether postures and velocities agree, and keep off ground and limits."""
+    robot, trajectory = motion.robot, motion.trajectory
+    judged = (
+        *_kinematics(motion),
+        *_contacts(motion, scenario),
+        *_limits(robot, trajectory),
+        *link_findings(robot, trajectory),
     )
+    return tuple(entry for entry in judged if entry.name in KINEMATIC)
 
 
 def _findings(worst: Sequence[Worst], motion: Motion, scenario: Scenario | None) -> tuple[Finding, ...]:

@@ -16,6 +16,7 @@ from rich.text import Text
 from multimodal_to.auditing.audit import Audit
 from multimodal_to.cli.completion import robots_or_folders, scenarios_or_files
 from multimodal_to.errors import InputError, OutputError, TrajectoryError, shortened
+from multimodal_to.exporting.reading import flavours_of, read_motion
 from multimodal_to.files.numbers import number, whole_number
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.scenarios import find
@@ -78,10 +79,9 @@ def chosen(name: str, settings: list[str] | None, *, paper: bool = False) -> Sce
 
 
 def loaded(file: Path, robot: str) -> tuple[Robot, Trajectory]:
-    """Return a trajectory with its robot; a file of bare arrays needs the robot named."""
-    if robot and "format_version" not in read_archive(file):
-        the_robot = load_robot(robot)
-        return the_robot, import_arrays(the_robot, file)
+    """Return a trajectory with its robot; a file of bare arrays, or of another program, needs the robot named."""
+    if robot and (moved := _of_others(file, robot)) is not None:
+        return moved
     trajectory = Trajectory.load(file)
     if not robot and (Path(trajectory.robot).name != trajectory.robot or trajectory.robot in ("", "..")):
         raise TrajectoryError(
@@ -91,6 +91,22 @@ def loaded(file: Path, robot: str) -> tuple[Robot, Trajectory]:
     the_robot = under_conditions(load_robot(robot or trajectory.robot).with_jets(trajectory.jet_names), trajectory)
     refuse_other_robot(trajectory, the_robot, what=f"'{file}'", of=("joints", "contact points"), error=TrajectoryError)
     return the_robot, trajectory
+
+
+def _of_others(file: Path, robot: str) -> tuple[Robot, Trajectory] | None:
+    """Return a motion of a tracker or a simulator, or of bare arrays, with its robot; None for the library's own files.
+
+    Args:
+        file: of the motion.
+        robot: by name or folder.
+    """
+    stored = {} if file.suffix.lower() == ".csv" else read_archive(file, leave_out_pickled=True)
+    if "format_version" in stored:
+        return None
+    the_robot = load_robot(robot)
+    if not stored or flavours_of(stored):
+        return the_robot, read_motion(the_robot, file)
+    return the_robot, import_arrays(the_robot, file)
 
 
 def writable(folder: Path) -> Path:

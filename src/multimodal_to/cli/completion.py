@@ -7,6 +7,7 @@ from glob import escape, glob
 from pathlib import Path
 
 from multimodal_to.exporting.export import EXPORTS
+from multimodal_to.exporting.motion import FLAVOURS
 from multimodal_to.models.robot import bundled_robots
 from multimodal_to.scenarios import SCENARIOS
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS
@@ -51,7 +52,12 @@ def figures(incomplete: str) -> list[str]:
 
 def exports(incomplete: str) -> list[str]:
     """Return the kinds of export that start so."""
-    return _starting(EXPORTS, incomplete)
+    return _starting((*EXPORTS, "motion"), incomplete)
+
+
+def flavours(incomplete: str) -> list[str]:
+    """Return the flavours of motion files that start so."""
+    return _starting(FLAVOURS, incomplete)
 
 
 def _starting(names: Iterable[str], incomplete: str) -> list[str]:

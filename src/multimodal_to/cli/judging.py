@@ -30,18 +30,22 @@ app.add_typer(robot_app, name="robot")
 def audit_file(
     file: File,
     robot: RobotOption = "",
+    kinematic: Annotated[
+        bool, typer.Option("--kinematic", help="Judge only what needs no force, of motions that are no plans.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON, for programs.")] = False,
 ) -> None:
     """Check from the file alone whether a trajectory is physically true and does what its scenario asks.
 
     Exit status 0 only when every property holds, 1 when one does not.
 
-    With --robot it also takes bare arrays under the names of a trajectory file, as the paper's data can be had.
+    With --robot it also takes bare arrays under the names of a trajectory file, as the paper's data can be had, and
+    motion files of trackers and simulators, as `export --to motion` writes them.
 
     Example: multimodal-to audit results/take-off/trajectory.npz
     """
     the_robot, trajectory = loaded(file, robot)
-    report, unusual = audit(the_robot, trajectory), trajectory.unusual_formulation()
+    report, unusual = audit(the_robot, trajectory, kinematic=kinematic), trajectory.unusual_formulation()
     others = differences(the_robot, trajectory)
     if as_json:
         more = {"formulation": unusual, "planned_for": list(others)}

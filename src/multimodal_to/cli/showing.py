@@ -21,9 +21,10 @@ from multimodal_to.cli.common import (
     writable,
     writable_file,
 )
-from multimodal_to.cli.completion import exports, figures
+from multimodal_to.cli.completion import exports, figures, flavours
 from multimodal_to.errors import InputError, OutputError, unknown
-from multimodal_to.exporting.export import EXPORTS
+from multimodal_to.exporting.export import EXPORTS, write_mujoco, write_pinocchio
+from multimodal_to.exporting.motion import FLAVOURS, write_motion
 from multimodal_to.models.robot import load_robot
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.conditions import under_conditions
@@ -157,18 +158,52 @@ def report_file(
 @app.command("export")
 def export_file(
     file: File,
-    to: Annotated[str, typer.Option("--to", help="csv, mat, mujoco or pinocchio.", autocompletion=exports)],
+    to: Annotated[str, typer.Option("--to", help="csv, mat, mujoco, pinocchio or motion.", autocompletion=exports)],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write. [FILE.csv and so on]")] = None,
+    flavour: Annotated[
+        str | None,
+        typer.Option(
+            help="Of a motion: mjlab, beyondmimic, holosoma, locomujoco, unitree-csv.", autocompletion=flavours
+        ),
+    ] = None,
+    fps: Annotated[
+        float | None,
+        typer.Option(parser=number_option, metavar="FLOAT", help="Of a motion: frames a second. [that of the flavour]"),
+    ] = None,
+    joint_order: Annotated[
+        str | None,
+        typer.Option(help="Of a motion: urdf, mujoco, pinocchio, isaac, or a TOML file of joint_names and body_names."),
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(help="The reader's own model, .urdf or MuJoCo's .xml: its joints and bodies, in its order."),
+    ] = None,
     robot: RobotOption = "",
 ) -> None:
     """Write a trajectory for another program, with names, units and conventions.
 
-    Example: multimodal-to export results/take-off/trajectory.npz --to mujoco --output take-off-mujoco.npz
+    Example: multimodal-to export results/take-off/trajectory.npz --to motion --flavour mjlab --model robot.xml
     """
-    if to not in EXPORTS:
-        raise InputError(unknown("export", to, EXPORTS))
+    if to not in (*EXPORTS, "motion"):
+        raise InputError(unknown("export", to, (*EXPORTS, "motion")))
+    if to == "motion" and flavour not in FLAVOURS:
+        raise InputError(unknown("flavour of motion", flavour or "", FLAVOURS))
+    if to != "motion" and any(option is not None for option in (flavour, fps, joint_order)):
+        raise InputError("--flavour, --fps and --joint-order go with --to motion")
+    if to not in ("motion", "mujoco", "pinocchio") and model is not None:
+        raise InputError("--model goes with --to motion, mujoco and pinocchio")
     the_robot, trajectory = loaded(file, robot)
-    suffix, write = EXPORTS[to]
-    target = output or (file.with_stem(f"{file.stem}-{to}") if suffix == ".npz" else file.with_suffix(suffix))
+    suffix = FLAVOURS[flavour].suffix if flavour else EXPORTS[to][0]
+    target = output or (
+        file.with_suffix(suffix) if to in ("csv", "mat") else file.with_name(f"{file.stem}-{flavour or to}{suffix}")
+    )
     writable_file(target, suffix)
-    out.print(f"wrote {write(the_robot, trajectory, target)}", soft_wrap=True)
+    if flavour:
+        write_motion(the_robot, trajectory, target, flavour=flavour, fps=fps, joint_order=joint_order, model=model)
+    elif to == "mujoco":
+        write_mujoco(the_robot, trajectory, target, model=model)
+    elif to == "pinocchio":
+        write_pinocchio(the_robot, trajectory, target, model=model)
+    else:
+        EXPORTS[to][1](the_robot, trajectory, target)
+    out.print(f"wrote {target}", soft_wrap=True)

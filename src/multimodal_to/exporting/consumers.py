@@ -1,14 +1,9 @@
-"""A motion of all joints of a URDF in the order of another program's model of it, with those that a plan holds still.
-
-Both programs go through the tree depth first, over fixed joints too. Of several joints on a link, Pinocchio takes them
-by name, in the order of bytes (urdfdom keeps them so), and MuJoCo in the order of the file.
-"""
+"""A motion of all joints of a URDF in the order of another program's model of it, and what holds still."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from lxml import etree
@@ -16,25 +11,11 @@ from lxml import etree
 from multimodal_to.adam import KinDynComputations
 from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.tree import Joint
-from multimodal_to.adam.urdf import read_urdf
-from multimodal_to.errors import OutputError, listed
+from multimodal_to.exporting.layouts import moving_joints
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import joint_torques, sampled
 from multimodal_to.trajectory.sameness import refuse_other_robot
-
-Order = Callable[[Joint], Any]
-"""The key by which joints that hang on one link are sorted."""
-
-
-def by_name(joint: Joint) -> bytes:
-    """Return what Pinocchio sorts joints on one link by."""
-    return joint.name.encode("utf-8")
-
-
-def by_place(joint: Joint) -> int:
-    """Return what MuJoCo sorts joints on one link by: nothing, they stay in the order of the file."""
-    return 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,8 +33,8 @@ class WholeMotion:
         return tuple(joint.name for joint in self.joints)
 
 
-def whole_motion(robot: Robot, trajectory: Trajectory, order: Order) -> WholeMotion:
-    """Return a motion of all joints of the robot's URDF: those that the robot does not move are where it holds them.
+def whole_motion(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> WholeMotion:
+    """Return a motion of joints of the robot's URDF: those that the robot does not move are where it holds them.
 
     A joint that mimics another follows it. Torques are those of joints that move one by one, as in the other program's
     model: what it takes to hold those that stand still, and to move a follower without its leader.
@@ -61,43 +42,25 @@ def whole_motion(robot: Robot, trajectory: Trajectory, order: Order) -> WholeMot
     Args:
         robot: the robot of the trajectory.
         trajectory: the motion.
-        order: of the joints that hang on one link.
+        names: of the joints, in the other program's order; joints that the robot moves are all among them.
 
     Raises:
         InputError: the trajectory is for another robot.
         OutputError: the URDF is no longer the one that the robot was read from.
     """
     refuse_other_robot(trajectory, robot)
-    _, joints = read_urdf(robot.urdf)
-    moving = tuple(_depth_first(joints, robot.kindyn.tree.base, order))
-    by_joint = {joint.name: joint for joint in moving}
-    tree = robot.kindyn.tree
-    if changed := {*tree.joint_names, *tree.followers, *tree.locked} ^ set(by_joint):
-        raise OutputError(f"'{robot.urdf}' no longer has the joints of {robot.name}: {listed(sorted(changed))} changed")
-    names = tuple(by_joint)
-    positions, velocities = _of_all_joints(robot, sampled(trajectory), names)
+    by_name = {joint.name: joint for joint in moving_joints(robot) if joint.kind != "fixed"}
+    positions, velocities = of_all_joints(robot, sampled(trajectory), names)
+    rows = [list(by_name).index(name) for name in names]
     return WholeMotion(
-        joints=moving,
+        joints=tuple(by_name[name] for name in names),
         positions=positions,
         velocities=velocities,
-        torques=_torques(robot, trajectory, names),
+        torques=_torques(robot, trajectory, tuple(by_name))[rows].reshape(len(rows), trajectory.time.size),
     )
 
 
-def _depth_first(joints: Sequence[Joint], base: str, order: Order) -> Iterator[Joint]:
-    """Yield the joints that can move, as a program meets them from the base on."""
-    below: dict[str, list[Joint]] = {}
-    for joint in joints:
-        below.setdefault(joint.parent, []).append(joint)
-    pending = sorted(below.get(base, []), key=order)[::-1]
-    while pending:
-        joint = pending.pop()
-        if joint.kind != "fixed":
-            yield joint
-        pending += sorted(below.get(joint.child, []), key=order)[::-1]
-
-
-def _of_all_joints(robot: Robot, motion: Trajectory, names: Sequence[str]) -> tuple[Array, Array]:
+def of_all_joints(robot: Robot, motion: Trajectory, names: Sequence[str]) -> tuple[Array, Array]:
     """Return positions and velocities of joints, (joints, columns of the motion) each.
 
     Args:
@@ -125,7 +88,7 @@ def _torques(robot: Robot, trajectory: Trajectory, names: tuple[str, ...]) -> Ar
         for how in robot.kindyn.tree.followers.values():
             own.pop(how.joint, None)  # it moves its followers as well
         whole = replace(robot, kindyn=KinDynComputations(_without_mimics(robot), names, gravity=robot.gravity))
-        positions, velocities = _of_all_joints(robot, trajectory, names)
+        positions, velocities = of_all_joints(robot, trajectory, names)
         motion = replace(trajectory, joint_names=names, joint_positions=positions, joint_velocities=velocities)
         own = dict(zip(names, joint_torques(whole, motion), strict=True)) | own
     return np.array([own[name] for name in names]).reshape(len(names), trajectory.time.size)

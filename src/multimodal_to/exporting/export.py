@@ -12,7 +12,8 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
 from multimodal_to.errors import OutputError
-from multimodal_to.exporting.consumers import WholeMotion, by_name, by_place, whole_motion
+from multimodal_to.exporting.consumers import WholeMotion, whole_motion
+from multimodal_to.exporting.layouts import layout_of
 from multimodal_to.files.writing import whole as whole_file
 from multimodal_to.models.joint_units import described
 from multimodal_to.models.robot import Robot
@@ -149,7 +150,13 @@ def _mat_units(quantity: Quantity, robot: Robot) -> str | Array:
 
 
 @checked
-def write_mujoco(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
+def write_mujoco(
+    robot: Robot,
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    *,
+    model: str | os.PathLike[str] | None = None,
+) -> Path:
     """Write an `.npz` with MuJoCo's qpos, qvel and ctrl for a free base, a row for each knot, and `conventions`.
 
     qpos = (p, quaternion w x y z, s); qvel = (ṗ in world axes, ω in the base's axes, ṡ); ctrl = (joint torques by
@@ -160,11 +167,13 @@ def write_mujoco(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[s
         robot: the robot of the trajectory.
         trajectory: the motion.
         path: of the file, by convention `.npz`.
+        model: the other program's own model, MuJoCo's XML or a URDF: its joints, in its order.
 
     Raises:
         InputError: the trajectory is for another robot.
+        ModelError: the model is not one of the robot.
     """
-    whole, trajectory = whole_motion(robot, trajectory, by_place), sampled(trajectory)
+    whole, trajectory = _whole(robot, trajectory, "mujoco", model), sampled(trajectory)
     parts = {
         "qpos": [trajectory.base_position, _unit_quaternions(trajectory)[[3, 0, 1, 2]], whole.positions],
         "qvel": [trajectory.base_linear_velocity, _in_base(trajectory, "base_angular_velocity"), whole.velocities],
@@ -182,7 +191,13 @@ def write_mujoco(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[s
 
 
 @checked
-def write_pinocchio(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
+def write_pinocchio(
+    robot: Robot,
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    *,
+    model: str | os.PathLike[str] | None = None,
+) -> Path:
     """Write an `.npz` with Pinocchio's q, v and tau for a free flyer, a row for each knot, and `conventions`.
 
     q = (p, quaternion x y z w, s); v = (ṗ and ω, both in the base's axes, ṡ); tau = joint torques by inverse dynamics
@@ -193,11 +208,13 @@ def write_pinocchio(robot: Robot, trajectory: Trajectory, path: str | os.PathLik
         robot: the robot of the trajectory.
         trajectory: the motion.
         path: of the file, by convention `.npz`.
+        model: the other program's own model, MuJoCo's XML or a URDF: its joints, in its order.
 
     Raises:
         InputError: the trajectory is for another robot.
+        ModelError: the model is not one of the robot.
     """
-    whole, trajectory = whole_motion(robot, trajectory, by_name), sampled(trajectory)
+    whole, trajectory = _whole(robot, trajectory, "pinocchio", model), sampled(trajectory)
     rows = [
         row
         for joint, values in zip(whole.joints, whole.positions, strict=True)
@@ -226,6 +243,18 @@ def write_pinocchio(robot: Robot, trajectory: Trajectory, path: str | os.PathLik
         f"tau = joint torques [{_joint_units(whole, 'N m')}].",
     )
     return _write_arrays(robot, trajectory, path, parts, conventions, whole)
+
+
+def _whole(robot: Robot, trajectory: Trajectory, order: str, model: str | os.PathLike[str] | None) -> WholeMotion:
+    """Return the motion of all joints of another program's model.
+
+    Args:
+        robot: the robot of the trajectory.
+        trajectory: the motion.
+        order: that of the program.
+        model: its own, or None for that of the robot's URDF.
+    """
+    return whole_motion(robot, trajectory, layout_of(robot, order, model=model).joints)
 
 
 def _joint_units(whole: WholeMotion, unit: str) -> str:

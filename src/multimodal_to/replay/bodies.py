@@ -16,6 +16,8 @@ from multimodal_to.replay.visuals import Appearance, Visual
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import frame_poses
 
+FINENESS = 2.0**-13
+"""Vertices of meshes are on a grid this fine [m]: what ends in zeros packs well."""
 Drawn = tuple[Any, Any, Array]
 """Geometry, material and transform of a visual, as the scene takes them."""
 
@@ -89,7 +91,9 @@ def drawn(visual: Visual) -> Drawn:
     """Return a visual in three.js's words."""
     material = _material(visual, 1.0)
     if visual.part is not None:
-        return SmoothMesh(*shaded(visual.part)), material, visual.transform
+        vertices, faces, normals = shaded(visual.part)
+        on_grid = np.round(vertices / FINENESS) * FINENESS
+        return SmoothMesh(on_grid, faces, normals), material, visual.transform
     geometry, turned = _primitive(visual.primitive)
     return geometry, material, visual.transform @ turned
 

@@ -35,7 +35,7 @@ class Embedded:
 
 @checked
 def embed(robot: Robot, trajectory: Trajectory, *, meshes: bool = True, height: int = 520) -> Embedded:
-    """Return the replay as a notebook shows it, in a frame of that height [pixel]; with meshes it has some 7 MB.
+    """Return the replay as a notebook shows it, in a frame of that height [pixel]; with meshes it has some 2 MB.
 
     Args:
         robot: that moves.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import html
 import json
 import os
@@ -149,7 +150,7 @@ def _player(
         credit=f'<div class="panel credit">{html.escape(attribution)}</div>' if attribution else "",
         bands="".join(_band(trajectory, *phase) for phase in phases),
         duration=f"{trajectory.duration:.6f}",
-        viewer=_VIEWER.read_text(encoding="utf-8"),
+        packed=_packed([_VIEWER.read_bytes(), *recorder.commands]),
         scene=_json(_content(trajectory, recorder, picture)),
     )
 
@@ -164,8 +165,13 @@ def _content(trajectory: Trajectory, recorder: Recorder, picture: Picture) -> di
         "home": picture.home.tolist(),
         "way": picture.way.tolist(),
         "labels": [{"text": text, "position": place.tolist()} for text, place in picture.labels],
-        "commands": [base64.b64encode(command).decode("ascii") for command in recorder.commands],
+        "lengths": [_VIEWER.stat().st_size, *map(len, recorder.commands)],
     }
+
+
+def _packed(parts: list[bytes]) -> str:
+    """Return bytes one after the other, compressed, as text: the viewer and the scene take a third so."""
+    return base64.b64encode(gzip.compress(b"".join(parts), mtime=0)).decode("ascii")
 
 
 def _title(trajectory: Trajectory) -> str:

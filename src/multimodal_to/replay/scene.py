@@ -54,14 +54,19 @@ class SmoothMesh(shapes.Geometry):  # type: ignore[misc]
 
     def __init__(self, vertices: Array, faces: np.ndarray, normals: Array) -> None:
         super().__init__()
-        self._arrays = {"position": vertices, "normal": normals}
-        self._faces = faces
+        self._vertices, self._faces, self._normals = vertices, faces, normals
 
     def lower(self, object_data: Any) -> dict[str, Any]:
-        """Return the geometry in three.js's words."""
-        packed = {name: shapes.pack_numpy_array(np.float32(array.T)) for name, array in self._arrays.items()}
+        """Return the geometry in three.js's words.
+
+        Normals are whole numbers of 8 bits, which three.js takes for numbers from −1 to 1.
+        """
+        position = shapes.pack_numpy_array(np.float32(self._vertices.T))
+        whole = np.round(np.clip(self._normals, -1.0, 1.0) * 127.0).astype(np.int8)
+        normal = shapes.pack_numpy_array(whole.view(np.uint8).T) | {"type": "Int8Array", "normalized": True}
         index = shapes.pack_numpy_array(np.uint32(self._faces.T))
-        return {"uuid": self.uuid, "type": "BufferGeometry", "data": {"attributes": packed, "index": index}}
+        attributes = {"position": position, "normal": normal}
+        return {"uuid": self.uuid, "type": "BufferGeometry", "data": {"attributes": attributes, "index": index}}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ from multimodal_to.replay.dress import Dress, read_dress
 from multimodal_to.replay.meshes import MeshWarning, Part, load_parts, simplified
 from multimodal_to.values import Value
 
-FACES = 110_000
+FACES = 80_000
 """Triangles of all meshes of a robot together; those of heavier robots are thinned out to about as many."""
 
 PLAIN = (0.8, 0.8, 0.82, 1.0)

@@ -23,11 +23,15 @@ MOST_ARRAYS = 1_000
 """The most arrays of an archive."""
 
 
-def read_archive(source: Path) -> dict[str, np.ndarray]:
+def read_archive(source: Path, *, leave_out_pickled: bool = False) -> dict[str, np.ndarray]:
     """Return the arrays of an `.npz` archive by name; nothing that is pickled is read, and nothing is too large.
 
     What the archive says of its sizes is checked before anything is unpacked: that of each file in the directory of the
     archive, which unpacking never exceeds, and that of each array against its file.
+
+    Args:
+        source: the file.
+        leave_out_pickled: pass over arrays of pickled objects, which else break the archive; they are not read.
 
     Raises:
         TrajectoryError: the file is missing, is no such archive, or is too large.
@@ -43,11 +47,15 @@ def read_archive(source: Path) -> dict[str, np.ndarray]:
     try:
         with zipfile.ZipFile(source) as archive:
             _check_directory(archive, source)
-            return {member.filename.removesuffix(".npy"): _array(archive, member) for member in archive.infolist()}
+            found = {member.filename.removesuffix(".npy"): _array(archive, member) for member in archive.infolist()}
     except TrajectoryError:
         raise
     except Exception as error:  # a broken archive takes zipfile, its unpackers and numpy to a dozen kinds of errors
         raise TrajectoryError(f"'{source}' is not a trajectory file of this library: {said(error)}") from error
+    if (pickled := [name for name, array in found.items() if array is None]) and not leave_out_pickled:
+        reason = f"'{pickled[0]}.npy' holds pickled objects, which are not read"
+        raise TrajectoryError(f"'{source}' is not a trajectory file of this library: {reason}")
+    return {name: array for name, array in found.items() if array is not None}
 
 
 def _check_directory(archive: zipfile.ZipFile, source: Path) -> None:
@@ -65,14 +73,17 @@ def _check_directory(archive: zipfile.ZipFile, source: Path) -> None:
             raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it is packed in another way")
 
 
-def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
-    """Return an array of an archive after a look at its head: numpy allots what that says before it reads on."""
+def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray | None:
+    """Return an array of an archive after a look at its head, or None if it holds pickled objects.
+
+    Numpy allots what the head says before it reads on.
+    """
     with archive.open(member) as stream:
         version = np.lib.format.read_magic(stream)
         read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, _, kind = read(stream)
         if kind.hasobject:
-            raise ValueError(f"'{member.filename}' holds pickled objects, which are not read")
+            return None
         if min(shape, default=1) < 0 or math.prod(shape) * kind.itemsize != member.file_size - stream.tell():
             raise ValueError(f"'{member.filename}' has another size than its shape {shown(shape)} says")
     with archive.open(member) as stream:
