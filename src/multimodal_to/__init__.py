@@ -34,7 +34,7 @@ from multimodal_to.ocp import (
     build,
     equal,
 )
-from multimodal_to.scenarios import Margins, Scenario, Start, Terminal, Weights
+from multimodal_to.scenarios import FrameTarget, Keyframe, Margins, Momentum, Scenario, Start, Terminal, Weights
 from multimodal_to.scenarios import files as scenario_files
 from multimodal_to.solving import (
     Ending,
@@ -59,13 +59,16 @@ __all__ = [
     "Ending",
     "FlatGround",
     "Formulation",
+    "FrameTarget",
     "FrictionCone",
     "HeightField",
     "Interval",
     "Ipopt",
+    "Keyframe",
     "KinDynComputations",
     "Knot",
     "Margins",
+    "Momentum",
     "MultimodalError",
     "Parameters",
     "Plane",

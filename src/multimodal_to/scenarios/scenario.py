@@ -4,17 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 
+import numpy as np
+
 from multimodal_to.arguments import check_fields
-from multimodal_to.errors import ScenarioError, shown
+from multimodal_to.errors import ScenarioError, listed, shown
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
-from multimodal_to.models.terrain import FlatGround, Surface
+from multimodal_to.models.terrain import FlatGround, Surface, heights_below
+from multimodal_to.scenarios.keyframes import (
+    AXES,
+    END,
+    HOME,
+    START,
+    Keyframe,
+    Placed,
+    Vector3,
+    asked_of,
+    by_axis,
+    contradiction,
+)
 from multimodal_to.values import FrozenMapping
-
-Vector3 = tuple[float, float, float]
 
 MOST_KNOTS = 10_000
 """More knots than this are a slip of the pen, and would fill any memory."""
@@ -158,14 +170,22 @@ class Scenario:
     """What it is about, for a person."""
     knots: int
     """N, the number of intervals [1]."""
-    initial_com: Vector3
-    """Where the CoM starts, in the world [m]."""
-    final_com: Vector3
-    """Where the CoM ends, in the world [m]."""
-    start: Start = Start.STANDING
-    """How the motion starts."""
-    terminal: Terminal
-    """How the motion ends."""
+    initial_com: Vector3 | str | None = None
+    """Where the CoM starts, in the world, three numbers or "home" [m]; the keyframe of the start may say it."""
+    initial_com_shift: Vector3 | None = None
+    """Where the CoM starts, from home's [m]."""
+    final_com: Vector3 | str | None = None
+    """Where the CoM ends, in the world, three numbers or "home" [m]; the keyframe of the end may say it."""
+    final_com_shift: Vector3 | None = None
+    """Where the CoM ends, from home's [m]."""
+    start: Start | None = None
+    """How the motion starts; by default as the keyframe of the start says, else standing."""
+    terminal: Terminal | None = None
+    """How the motion ends; by default as the keyframe of the end says, which there has to be then."""
+    keyframes: tuple[Keyframe, ...] = ()
+    """What is asked of the motion at chosen knots, beside its start and its end."""
+    robot: str | None = None
+    """The robot that it is for: a bundled one by name, or a robot's folder, in a file relative to that file."""
     mid_height_min: float | None = None
     """Least height of the CoM at mid-horizon, where one is asked for [m]."""
     jets: bool = True
@@ -200,15 +220,146 @@ class Scenario:
     def __post_init__(self) -> None:
         check_fields(self, ScenarioError)
         object.__setattr__(self, "allowances", FrozenMapping(self.allowances))
+        object.__setattr__(self, "keyframes", tuple(self.keyframes))
         self._check_name()
         self._check_numbers()
+        self._take_ends()
         self._check_positions()
+        self._check_keyframes()
         self._check_reach()
 
     def contact_bounds(self, robot: Robot) -> tuple[float, float]:
         """Return ε_n and ε_t [N m]; those that the scenario leaves open are `COMPLEMENTARITY` and `SLIDING` m g L."""
         unit = robot.weight * robot.standing_height
         return self.complementarity_max or COMPLEMENTARITY * unit, self.sliding_max or SLIDING * unit
+
+    # ---------------------------------------------------------------- keyframes
+
+    @property
+    def start_com(self) -> Vector3:
+        """Return where the CoM starts [m].
+
+        Raises:
+            ScenarioError: it is said from a robot's home, see `for_robot`, or a state will say it.
+        """
+        if self.initial_com is None or isinstance(self.initial_com, str):
+            raise ScenarioError("initial_com is no position yet; expected a scenario of `for_robot`")
+        return self.initial_com
+
+    @property
+    def end_com(self) -> Vector3:
+        """Return where the CoM ends [m]; along an axis for which nothing is asked, where it was asked to be last."""
+        if isinstance(self.final_com, tuple):
+            return self.final_com
+        known = dict(zip(AXES, self.start_com, strict=True))
+        for one in sorted(self.placed(), key=lambda some: some.knot):
+            known |= {} if isinstance(one.keyframe.com, str) else by_axis(one.keyframe.com)
+        return known["x"], known["y"], known["z"]
+
+    def for_robot(self, robot: Robot) -> Scenario:
+        """Return the scenario with numbers for a CoM that is said from home's, on the ground below the origin.
+
+        Raises:
+            ScenarioError: a keyframe names a joint or a frame that the robot lacks, or contradicts another.
+        """
+        for one in self.placed():
+            one.keyframe.check_names(robot, one.label)
+        ends = (self.initial_com, self.final_com)
+        if HOME not in ends and not any(keyframe.of_home for keyframe in self.keyframes):
+            return self
+        x, y, z = robot.home_com
+        home = x, y, z + float(heights_below(self.surface, np.array([[x], [y], [z]]))[0])
+        found = {one.knot: one.keyframe.from_home(home).com for one in self.short_keyframes() if one.keyframe.of_home}
+        return replace(
+            self,
+            initial_com=found.get(0, self.initial_com),
+            initial_com_shift=None,
+            final_com=found.get(self.knots, self.final_com),
+            final_com_shift=None,
+            keyframes=tuple(keyframe.from_home(home) for keyframe in self.keyframes),
+        )
+
+    def short_keyframes(self) -> tuple[Placed, ...]:
+        """Return the keyframes that have a short name: what `start` and `terminal`, and the CoM's numbers, ask for."""
+        asked: list[tuple[str, int, dict[str, object]]] = [
+            (START, 0, {"com": self.initial_com, "com_shift": self.initial_com_shift} | _ASKED[self.start]),
+            (
+                "middle",
+                self.knots // 2,
+                {} if self.mid_height_min is None else {"com_min": {"z": self.mid_height_min}},
+            ),
+            (END, self.knots, {"com": self.final_com, "com_shift": self.final_com_shift} | _ASKED[self.terminal]),
+        ]
+        return tuple(
+            Placed(label=label, knot=knot, keyframe=Keyframe(knot=knot, **some))  # type: ignore[arg-type]
+            for label, knot, some in asked
+            if any(value is not None for value in some.values())
+        )
+
+    def placed(self) -> tuple[Placed, ...]:
+        """Return every keyframe at its knot: those with a short name, then those of `keyframes`."""
+        own = (
+            Placed(label=f"keyframe {index}", knot=keyframe.at(self.knots), keyframe=keyframe)
+            for index, keyframe in enumerate(self.keyframes, 1)
+        )
+        return (*self.short_keyframes(), *own)
+
+    def _take_ends(self) -> None:
+        """Take how it starts and ends, and the CoM there, from the keyframes of the first and last knots."""
+        first, last = (
+            [one for one in self.keyframes if one.weight is None and one.at(self.knots) == knot]
+            for knot in (0, self.knots)
+        )
+        hovers, stands = (any(getattr(one, name) for one in last) for name in ("hover", "standing"))
+        if self.start is None:
+            object.__setattr__(self, "start", Start.HOVER if any(one.hover for one in first) else Start.STANDING)
+        if self.terminal is None and not last:
+            raise ScenarioError("the scenario lacks 'terminal', or a keyframe for its end")
+        if self.terminal in (None, Terminal.FREE):
+            ends = Terminal.HOVER if hovers else Terminal.STANDING if stands else Terminal.FREE
+            object.__setattr__(self, "terminal", ends)
+        for name, some in (("initial_com", first), ("final_com", last)):
+            shift = f"{name}_shift"
+            if getattr(self, name) is None and getattr(self, shift) is not None:
+                object.__setattr__(self, name, HOME)
+            if isinstance(getattr(self, name), tuple) and getattr(self, shift) is not None:
+                raise ScenarioError(f"{shift} is from home's CoM, and {name} has numbers; expected one of them")
+            for one in some if getattr(self, name) is None else ():
+                if one.of_home or isinstance(one.com, tuple):
+                    object.__setattr__(self, name, HOME if one.of_home else one.com)
+                    object.__setattr__(self, shift, one.com_shift)
+        if self.initial_com is None and self.start is not Start.GIVEN:
+            raise ScenarioError("the scenario lacks 'initial_com', or a keyframe for its start with a whole 'com'")
+        if self.final_com is None and not last:
+            raise ScenarioError("the scenario lacks 'final_com', or a keyframe for its end")
+
+    def _check_keyframes(self) -> None:
+        """Refuse keyframes outside of the horizon, and those that contradict each other."""
+        for one in self.placed():
+            if one.knot > self.knots:
+                raise ScenarioError(f"{one.label}: knot is {one.knot}; expected 0 to {self.knots}, the number of knots")
+            if one.knot == 0 and one.label != START and one.keyframe.weight is None:
+                self._check_first(one)
+        for knot in sorted({one.knot for one in self.placed()}):
+            here = [one for one in self.placed() if one.knot == knot and one.keyframe.weight is None]
+            in_air, on_feet = (
+                next((one.label for one in here if getattr(one.keyframe, name)), "") for name in ("hover", "standing")
+            )
+            if in_air and on_feet:
+                raise ScenarioError(
+                    f"{in_air} asks for a hover at knot {knot} and {on_feet} for standing; expected one of them"
+                )
+        if found := contradiction(self.placed()):
+            raise ScenarioError(found)
+
+    def _check_first(self, one: Placed) -> None:
+        """Refuse what the start says itself: a standing start is a posture that is found, a given one is a state."""
+        more = [name for name in asked_of(one.keyframe) if name not in _OF_START]
+        if more and self.start is not Start.HOVER:
+            raise ScenarioError(
+                f"{one.label} asks for {listed(more)} at the first knot, and a start that is '{_value(self.start)}' "
+                "gives the whole posture there; expected it at a later knot, or a start in a hover"
+            )
 
     def _check_name(self) -> None:
         """Refuse a name that is no plain one, since results go to a folder of that name, and titles no screen takes."""
@@ -240,22 +391,48 @@ class Scenario:
             raise ScenarioError(f"guess_steps is {shown(self.guess_steps)}; expected 0 to the number of knots")
 
     def _check_positions(self) -> None:
-        for label in ("initial_com", "final_com", "com_range"):
+        for label in ("initial_com", "final_com"):
+            if isinstance(text := getattr(self, label), str) and text != HOME:
+                raise ScenarioError(f"{label} is {shown(text)}; expected three numbers or '{HOME}'")
+        for label in ("initial_com", "final_com", "initial_com_shift", "final_com_shift", "com_range"):
             value = getattr(self, label)
+            if value is None or isinstance(value, str):
+                continue
             if len(value) != 3 or not all(math.isfinite(number) for number in value):
                 raise ScenarioError(f"{label} is {value}; expected three finite numbers [m]")
             object.__setattr__(self, label, tuple(map(float, value)))
         for label in ("initial_com", "final_com"):
-            for axis, number, bound in zip("xyz", getattr(self, label), self.com_range, strict=True):
+            if not isinstance(position := getattr(self, label), tuple):
+                continue
+            for axis, number, bound in zip(AXES, position, self.com_range, strict=True):
                 if abs(number) > bound:
                     raise ScenarioError(f"{label} has {axis} = {number} m, beyond com_range, {bound} m")
 
     def _check_reach(self) -> None:
         """Refuse a distance that the CoM cannot travel at the greatest base speed in the longest time."""
         longest = self.knots * self.interval_max
-        for axis, start, end in zip("xyz", self.initial_com, self.final_com, strict=True):
+        if not (isinstance(self.initial_com, tuple) and isinstance(self.final_com, tuple)):
+            return
+        for axis, start, end in zip(AXES, self.initial_com, self.final_com, strict=True):
             if abs(end - start) > self.base_speed_max * longest:
                 raise ScenarioError(
                     f"the CoM has to go {abs(end - start):.3g} m along {axis} in at most {longest:.3g} s, faster than "
                     f"base_speed_max, {self.base_speed_max} m/s; allow more knots, a longer interval_max or more speed"
                 )
+
+
+_ASKED: dict[Start | Terminal | None, dict[str, object]] = {
+    Start.STANDING: {"standing": True},
+    Start.HOVER: {"hover": True},
+    Start.GIVEN: {},
+    Terminal.HOVER: {"hover": True},
+    Terminal.STANDING: {"standing": True},
+    Terminal.FREE: {},
+}
+"""What a start or an end is as a keyframe."""
+_OF_START = ("com", "com_shift", "standing", "rest")
+"""What a keyframe may ask for at a first knot that is not found."""
+
+
+def _value(start: Start | None) -> str:
+    return "" if start is None else start.value
