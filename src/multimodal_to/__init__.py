@@ -24,7 +24,9 @@ from multimodal_to.ocp import (
     Cost,
     Formulation,
     Interval,
+    Intervals,
     Knot,
+    Knots,
     Parameters,
     Problem,
     Where,
@@ -33,6 +35,7 @@ from multimodal_to.ocp import (
     between,
     build,
     equal,
+    standing_posture,
 )
 from multimodal_to.scenarios import FrameTarget, Keyframe, Margins, Momentum, Scenario, Start, Terminal, Weights
 from multimodal_to.scenarios import files as scenario_files
@@ -63,10 +66,12 @@ __all__ = [
     "FrictionCone",
     "HeightField",
     "Interval",
+    "Intervals",
     "Ipopt",
     "Keyframe",
     "KinDynComputations",
     "Knot",
+    "Knots",
     "Margins",
     "Momentum",
     "MultimodalError",
@@ -100,5 +105,6 @@ __all__ = [
     "scenario_files",
     "scenarios",
     "solve",
+    "standing_posture",
     "state_at",
 ]

@@ -19,7 +19,7 @@ def task_findings(motion: Motion, scenario: Scenario) -> list[Worst]:
 
 
 def _start(motion: Motion, scenario: Scenario) -> list[Worst]:
-    findings = [_com("start: CoM", motion, 0, scenario.initial_com)]
+    findings = [_com("start: CoM", motion, 0, scenario.start_com)]
     if scenario.start is Start.GIVEN:  # it may move, and nothing has to carry it
         return findings
     findings += _rest("start", motion, 0)
@@ -32,7 +32,7 @@ def _start(motion: Motion, scenario: Scenario) -> list[Worst]:
 
 def _end(motion: Motion, scenario: Scenario) -> list[Worst]:
     last = motion.trajectory.knots
-    findings = [_com("end: CoM", motion, last, scenario.final_com)]
+    findings = [] if scenario.final_com is None else [_com("end: CoM", motion, last, scenario.end_com)]
     if scenario.terminal in (Terminal.HOVER, Terminal.STANDING):
         findings += _rest("end", motion, last)
     if scenario.terminal is Terminal.STANDING:

@@ -44,7 +44,7 @@ from multimodal_to.scenarios import SCENARIOS, find
 from multimodal_to.scenarios import paper as as_in_paper
 from multimodal_to.scenarios.data import stored, to_dict
 from multimodal_to.scenarios.files import change, to_toml
-from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.scenarios.scenario import Scenario, word
 from multimodal_to.solving import Ipopt, Relaxation, Solution, Status, relax
 from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
@@ -70,11 +70,11 @@ def list_scenarios() -> None:
 
 def _numbers(scenario: Scenario) -> str:
     durations = dict.fromkeys(f"{scenario.knots * dt:g}" for dt in (scenario.interval_min, scenario.interval_max))
-    start, end = (" ".join(f"{number:g}" for number in com) for com in (scenario.initial_com, scenario.final_com))
+    start, end = (" ".join(f"{number:g}" for number in com) for com in (scenario.start_com, scenario.end_com))
     middle = "" if scenario.mid_height_min is None else f"above {scenario.mid_height_min:g} m at mid-horizon, "
     return (
-        f"{scenario.knots} knots, {' to '.join(durations)} s, CoM from {start} m ({scenario.start.value}) to {end} m "
-        f"({scenario.terminal.value}), {middle}jets {'on' if scenario.jets else 'off'}, "
+        f"{scenario.knots} knots, {' to '.join(durations)} s, CoM from {start} m ({word(scenario.start)}) to {end} m "
+        f"({word(scenario.terminal)}), {middle}jets {'on' if scenario.jets else 'off'}, "
         f"ground: {to_dict(scenario)['surface']['kind']}"
     )
 

@@ -14,7 +14,7 @@ from multimodal_to.doctor.task import Task
 from multimodal_to.doctor.thrust import spool_up_time, weight
 from multimodal_to.doctor.travel import leap, push, speed
 from multimodal_to.doctor.weighing import allowances, costs, groups, scales
-from multimodal_to.errors import MultimodalError
+from multimodal_to.errors import MultimodalError, ScenarioError
 from multimodal_to.models.robot import Robot
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.scenarios.scenario import Scenario
@@ -53,7 +53,10 @@ def doctor(robot: Robot, scenario: Scenario, formulation: Formulation | None = N
         scenario: the task.
         formulation: what the problem is made of; by default `Formulation.executable()`.
     """
-    task = Task.of(robot, scenario, formulation)
+    try:
+        task = Task.of(robot, scenario, formulation)
+    except ScenarioError as cause:
+        return refusal("keyframes", cause, "name what the robot has, and ask for one thing at a knot")
     if not robot.contacts:
         return refusal("contacts", f"{robot.name} has no contact points to stand on", "name some in its robot.toml")
     findings = [finding for check in CHECKS for finding in check(task)]

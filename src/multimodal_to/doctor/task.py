@@ -35,7 +35,11 @@ class Task:
             robot: whose motion it is.
             scenario: the task.
             formulation: what the problem is made of; by default `Formulation.executable()`.
+
+        Raises:
+            ScenarioError: a keyframe names a joint or a frame that the robot lacks, or contradicts another.
         """
+        scenario = scenario.for_robot(robot)
         robot = robot if scenario.jets else robot.with_jets(())
         return cls(robot=robot, scenario=scenario, formulation=formulation or Formulation.executable())
 
@@ -58,9 +62,9 @@ class Task:
         """Return where the CoM has to hover [m], by when."""
         scenario, where = self.scenario, dict[str, Vector3]()
         if scenario.start is Start.HOVER:
-            where["start"] = scenario.initial_com
+            where["start"] = scenario.start_com
         if scenario.terminal is Terminal.HOVER:
-            where["end"] = scenario.final_com
+            where["end"] = scenario.end_com
         return where
 
     @cached_property
@@ -93,12 +97,12 @@ class Task:
     @cached_property
     def start_posture(self) -> Posture | None:
         """Return the posture in which the motion starts on its feet, if it does and there is one."""
-        return self._standing(self.scenario.initial_com) if self.stands_at_start else None
+        return self._standing(self.scenario.start_com) if self.stands_at_start else None
 
     @cached_property
     def end_posture(self) -> Posture | None:
         """Return a posture in which the motion can end on its feet, if it has to and one is found."""
-        return self._standing(self.scenario.final_com) if self.stands_at_end else None
+        return self._standing(self.scenario.end_com) if self.stands_at_end else None
 
     @property
     def posture(self) -> Posture:

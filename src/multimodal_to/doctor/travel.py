@@ -24,7 +24,7 @@ def speed(task: Task) -> Iterator[Symptom]:
     def furthest(intervals: int) -> float:
         return intervals * scenario.interval_max * scenario.base_speed_max
 
-    start, end = np.array(scenario.initial_com), np.array(scenario.final_com)
+    start, end = np.array(scenario.start_com), np.array(scenario.end_com)
     stretches = [("from start to end", float(np.abs(end - start).max()), task.moving_intervals)]
     if scenario.mid_height_min is not None:
         middle = scenario.knots // 2
@@ -54,7 +54,7 @@ def push(task: Task) -> Iterator[Symptom]:
     scenario, robot = task.scenario, task.robot
     if robot.jets or not isinstance(scenario.surface, FlatGround) or not (task.stands_at_start and task.stands_at_end):
         return
-    way = np.abs(np.subtract(scenario.final_com, scenario.initial_com))[:2]
+    way = np.abs(np.subtract(scenario.end_com, scenario.start_com))[:2]
     moving, step, friction = task.moving_intervals, scenario.interval_max, task.parameters.friction
     gravity = robot.weight / robot.mass
     furthest = friction * gravity * (moving + 1) * moving * step**2 / 2
@@ -77,8 +77,8 @@ def leap(task: Task) -> Iterator[Symptom]:
     if robot.jets or task.hovers or not isinstance(scenario.surface, FlatGround):
         return
     heights = {"mid_height_min": scenario.mid_height_min}
-    if scenario.terminal is Terminal.FREE:
-        heights["the height of final_com"] = scenario.final_com[2]
+    if scenario.terminal is Terminal.FREE and scenario.final_com is not None:
+        heights["the height of final_com"] = scenario.end_com[2]
     gravity = robot.weight / robot.mass
     for label, height in heights.items():
         # A contact point keeps its share of the weight up to a height of complementarity_max over that share.

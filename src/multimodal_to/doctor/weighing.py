@@ -106,7 +106,7 @@ def scales(task: Task) -> Iterator[Symptom]:
     known = {variable.name: variable.scale for variable in task.formulation.variables}
     expected = {
         "contact_forces": robot.weight / len(robot.contacts),
-        "com_position": float(np.abs([scenario.initial_com, scenario.final_com]).max()),
+        "com_position": float(np.abs([scenario.start_com, scenario.end_com]).max()),
     }
     if robot.jets and task.hovers:
         expected["thrust"] = robot.weight / len(robot.jets)

@@ -60,11 +60,12 @@ def _keys(record: type, prefix: str, where: str, unions: Unions) -> Iterator[Key
             raise InputError(
                 f"the field '{entry.name}' of {record.__name__} has no text below it that says its meaning"
             )
-        name, kinds = prefix + entry.name, members_of(hints[entry.name])
-        kind = kinds[0]
+        name = prefix + entry.name
+        types = members_of(hints[entry.name])
+        kind = types[0]
         unit = ", ".join(_UNIT.findall(texts[entry.name]))
         default, meaning = _default(entry, kind, unions), _UNIT.sub("", texts[entry.name]).rstrip(".")
-        said = " or ".join(_kind(one, unions) for one in kinds)
+        said = " or ".join(_kind(one, unions) for one in types)
         yield Key(name=name, kind=said, unit=unit, default=default, meaning=meaning, where=where)
         if kind in unions:
             kinds = ", ".join(unions[kind])

@@ -16,7 +16,7 @@ from multimodal_to.models.state import State
 from multimodal_to.models.terrain import heights_below
 from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.variables import Bounds
-from multimodal_to.scenarios.scenario import Scenario, Start
+from multimodal_to.scenarios.scenario import Scenario, Start, word
 from multimodal_to.trajectory import rules
 from multimodal_to.values import FrozenMapping
 
@@ -47,7 +47,7 @@ def check(robot: Robot, scenario: Scenario, initial: State | None) -> None:
         return
     if scenario.start is not Start.GIVEN:
         raise InputError(
-            f"a state to start in is given, but '{scenario.name}' starts in '{scenario.start.value}'; expected a "
+            f"a state to start in is given, but '{scenario.name}' starts in '{word(scenario.start)}'; expected a "
             "scenario with start 'given'"
         )
     initial.refuse_other_robot(robot)

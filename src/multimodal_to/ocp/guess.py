@@ -10,6 +10,7 @@ import numpy as np
 from multimodal_to.adam import centroidal, quaternion
 from multimodal_to.adam.kinematics import Pose, forward_kinematics
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.attitude import signed_like
 from multimodal_to.models.robot import Posture, Robot
@@ -31,6 +32,7 @@ LANDED = 0.3
 """Share of the horizon in which a motion from the air to the ground comes down [1]."""
 
 
+@checked
 def standing_posture(robot: Robot, surface: Surface, com: Vector3) -> Posture:
     """Return the posture nearest to home with every contact point on the ground and the CoM at `com` [m].
 
@@ -142,7 +144,7 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
         layout: of the variables of a knot.
     """
     knots = scenario.knots + 1
-    start, end = np.array(scenario.initial_com), np.array(scenario.final_com)
+    start, end = np.array(scenario.start_com), np.array(scenario.end_com)
     travelled = (end - start)[:, None] * _progress(scenario)
     guess = np.zeros((layout.size, knots))
     view = layout.read(guess)

@@ -50,7 +50,8 @@ def from_dict(table: Mapping[str, Any], base: Scenario | None = None) -> Scenari
         for com in HEIGHTS.values():  # one way to say it replaces the other
             ways = com in table, f"{com}_shift" in table
             if base is not None and any(ways):
-                base = replace(base, **{com: getattr(base, com) if ways[0] else HOME, f"{com}_shift": None})
+                changed: dict[str, Any] = {com: getattr(base, com) if ways[0] else HOME, f"{com}_shift": None}
+                base = replace(base, **changed)
         for key, com in HEIGHTS.items():
             if key in table:
                 table[com] = _raised(table.pop(key), key, table.get(com, getattr(base, com, None)), com)

@@ -6,8 +6,12 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
+import numpy as np
+
+from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import check_fields
 from multimodal_to.errors import InputError, ScenarioError, shown, unknown
+from multimodal_to.models import attitude
 from multimodal_to.models.robot import Robot
 from multimodal_to.values import FrozenMapping
 
@@ -286,6 +290,28 @@ def _said(lower: float, upper: float) -> str:
     return f"at most {upper:g}" if lower == -math.inf else f"{lower:g} to {upper:g}"
 
 
+def attitude_at(robot: Robot, placed: Sequence[Placed], knot: int) -> Array:
+    """Return the attitude of the base in a hover at a knot, a quaternion x y z w, (4,).
+
+    It is the `base_orientation` that a keyframe asks for there; else upright, turned by the `yaw` of one, if any.
+
+    Args:
+        robot: whose upright and heading are meant.
+        placed: the keyframes of the scenario.
+        knot: of the horizon.
+    """
+    upright: Array = robot.upright.base_quaternion_xyzw
+    for one in placed:
+        if one.knot != knot or one.keyframe.weight is not None:
+            continue
+        if one.keyframe.base_orientation is not None:
+            return attitude.signed_like(np.array(one.keyframe.base_orientation), upright)
+        if one.keyframe.yaw is not None:
+            half = 0.5 * one.keyframe.yaw
+            return attitude.product(np.append(math.sin(half) * robot.up, math.cos(half)), upright)
+    return upright
+
+
 def by_axis(value: Vector3 | Mapping[str, float] | None) -> Mapping[str, float]:
     """Return a position by axis: of three numbers all, of none no axis.
 
@@ -330,6 +356,7 @@ def _keep_quaternion(record: object, name: str) -> None:
     length = math.hypot(*value)
     if len(value) != 4 or not 0.0 < length < math.inf:
         raise InputError(f"{name} is {shown(value)}; expected a quaternion x y z w, not all zero")
+    length = 1.0 if abs(length - 1.0) < _ROUNDING else length  # so that one that was read stays as it is
     object.__setattr__(record, name, tuple(float(one) / length for one in value))
 
 

@@ -21,12 +21,13 @@ from multimodal_to.scenarios.keyframes import (
     START,
     Keyframe,
     Placed,
-    Vector3,
     asked_of,
     by_axis,
     contradiction,
 )
 from multimodal_to.values import FrozenMapping
+
+Vector3 = tuple[float, float, float]
 
 MOST_KNOTS = 10_000
 """More knots than this are a slip of the pen, and would fill any memory."""
@@ -264,17 +265,15 @@ class Scenario:
         """
         for one in self.placed():
             one.keyframe.check_names(robot, one.label)
-        ends = (self.initial_com, self.final_com)
-        if HOME not in ends and not any(keyframe.of_home for keyframe in self.keyframes):
+        if HOME not in (self.initial_com, self.final_com) and not any(one.of_home for one in self.keyframes):
             return self
         x, y, z = robot.home_com
         home = x, y, z + float(heights_below(self.surface, np.array([[x], [y], [z]]))[0])
-        found = {one.knot: one.keyframe.from_home(home).com for one in self.short_keyframes() if one.keyframe.of_home}
         return replace(
             self,
-            initial_com=found.get(0, self.initial_com),
+            initial_com=_placed(self.initial_com, self.initial_com_shift, home),
             initial_com_shift=None,
-            final_com=found.get(self.knots, self.final_com),
+            final_com=_placed(self.final_com, self.final_com_shift, home),
             final_com_shift=None,
             keyframes=tuple(keyframe.from_home(home) for keyframe in self.keyframes),
         )
@@ -310,28 +309,34 @@ class Scenario:
             [one for one in self.keyframes if one.weight is None and one.at(self.knots) == knot]
             for knot in (0, self.knots)
         )
-        hovers, stands = (any(getattr(one, name) for one in last) for name in ("hover", "standing"))
         if self.start is None:
             object.__setattr__(self, "start", Start.HOVER if any(one.hover for one in first) else Start.STANDING)
         if self.terminal is None and not last:
             raise ScenarioError("the scenario lacks 'terminal', or a keyframe for its end")
         if self.terminal in (None, Terminal.FREE):
+            hovers, stands = (any(getattr(one, name) for one in last) for name in ("hover", "standing"))
             ends = Terminal.HOVER if hovers else Terminal.STANDING if stands else Terminal.FREE
             object.__setattr__(self, "terminal", ends)
-        for name, some in (("initial_com", first), ("final_com", last)):
-            shift = f"{name}_shift"
-            if getattr(self, name) is None and getattr(self, shift) is not None:
-                object.__setattr__(self, name, HOME)
-            if isinstance(getattr(self, name), tuple) and getattr(self, shift) is not None:
-                raise ScenarioError(f"{shift} is from home's CoM, and {name} has numbers; expected one of them")
-            for one in some if getattr(self, name) is None else ():
-                if one.of_home or isinstance(one.com, tuple):
-                    object.__setattr__(self, name, HOME if one.of_home else one.com)
-                    object.__setattr__(self, shift, one.com_shift)
-        if self.initial_com is None and self.start is not Start.GIVEN:
+        self._take_com("initial_com", first)
+        self._take_com("final_com", last)
+        if self.initial_com is None and self.start is Start.GIVEN:
+            object.__setattr__(self, "initial_com", HOME)  # until the state says it
+        if self.initial_com is None:
             raise ScenarioError("the scenario lacks 'initial_com', or a keyframe for its start with a whole 'com'")
         if self.final_com is None and not last:
             raise ScenarioError("the scenario lacks 'final_com', or a keyframe for its end")
+
+    def _take_com(self, name: str, here: list[Keyframe]) -> None:
+        """Take the CoM of an end from home, where only a shift is given, or from the keyframes there."""
+        com, shift = getattr(self, name), getattr(self, f"{name}_shift")
+        if shift is not None and com is None:
+            object.__setattr__(self, name, HOME)
+        elif shift is not None and com != HOME:
+            raise ScenarioError(f"{name}_shift is from home's CoM, and {name} has numbers; expected one of them")
+        whole = [one for one in here if one.of_home or isinstance(one.com, tuple)]
+        if getattr(self, name) is None and whole:
+            object.__setattr__(self, name, HOME if whole[0].of_home else whole[0].com)
+            object.__setattr__(self, f"{name}_shift", whole[0].com_shift)
 
     def _check_keyframes(self) -> None:
         """Refuse keyframes outside of the horizon, and those that contradict each other."""
@@ -357,7 +362,7 @@ class Scenario:
         more = [name for name in asked_of(one.keyframe) if name not in _OF_START]
         if more and self.start is not Start.HOVER:
             raise ScenarioError(
-                f"{one.label} asks for {listed(more)} at the first knot, and a start that is '{_value(self.start)}' "
+                f"{one.label} asks for {listed(more)} at the first knot, and a start that is '{word(self.start)}' "
                 "gives the whole posture there; expected it at a later knot, or a start in a hover"
             )
 
@@ -434,5 +439,20 @@ _OF_START = ("com", "com_shift", "standing", "rest")
 """What a keyframe may ask for at a first knot that is not found."""
 
 
-def _value(start: Start | None) -> str:
+def _placed(com: Vector3 | str | None, shift: Vector3 | None, home: Vector3) -> Vector3 | str | None:
+    """Return the CoM of an end with numbers [m].
+
+    Args:
+        com: as the scenario has it.
+        shift: from home's.
+        home: where that is.
+    """
+    if com != HOME:
+        return com
+    x, y, z = (a + b for a, b in zip(home, shift or (0.0, 0.0, 0.0), strict=True))
+    return x, y, z
+
+
+def word(start: Start | Terminal | None) -> str:
+    """Return how a file says a start or an end."""
     return "" if start is None else start.value
