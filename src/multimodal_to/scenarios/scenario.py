@@ -295,13 +295,16 @@ class Scenario:
             if any(value is not None for value in some.values())
         )
 
-    def placed(self) -> tuple[Placed, ...]:
-        """Return every keyframe at its knot: those with a short name, then those of `keyframes`."""
-        own = (
+    def own_keyframes(self) -> tuple[Placed, ...]:
+        """Return those of `keyframes` at their knots."""
+        return tuple(
             Placed(label=f"keyframe {index}", knot=keyframe.at(self.knots), keyframe=keyframe)
             for index, keyframe in enumerate(self.keyframes, 1)
         )
-        return (*self.short_keyframes(), *own)
+
+    def placed(self) -> tuple[Placed, ...]:
+        """Return every keyframe at its knot: those with a short name, then those of `keyframes`."""
+        return (*self.short_keyframes(), *self.own_keyframes())
 
     def _take_ends(self) -> None:
         """Take how it starts and ends, and the CoM there, from the keyframes of the first and last knots."""
