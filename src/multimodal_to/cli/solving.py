@@ -15,6 +15,7 @@ from rich.table import Column, Table
 from multimodal_to.auditing import Audit, audit, check_allowances
 from multimodal_to.cli import completion
 from multimodal_to.cli.common import (
+    DEFAULT_ROBOT,
     OptionalName,
     RobotOption,
     ScenarioName,
@@ -25,6 +26,7 @@ from multimodal_to.cli.common import (
     loaded,
     number_option,
     out,
+    robot_for,
     say,
     whole_number_option,
     writable,
@@ -133,7 +135,7 @@ def _show_torques(file: Path, robot: str) -> None:
 def doctor(
     name: ScenarioName,
     settings: Settings = None,
-    robot: RobotOption = "ironcub",
+    robot: RobotOption = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON, for programs.")] = False,
 ) -> None:
     """Say in about a second whether a task can work at all, and what to change where it cannot.
@@ -142,13 +144,15 @@ def doctor(
 
     Example: multimodal-to doctor take-off --set knots=20
     """
-    the_robot = load_robot(robot)
     if not name.endswith(".toml"):
         find(name)  # a name that does not exist is no task
     try:
-        diagnosis = examine(the_robot, chosen(name, settings))
+        scenario = chosen(name, settings)
     except ScenarioError as error:  # there is no scenario to look at
-        diagnosis = refusal("scenario", error)
+        the_robot, diagnosis = load_robot(robot or DEFAULT_ROBOT), refusal("scenario", error)
+    else:
+        the_robot = load_robot(robot_for(scenario, robot, file=name))
+        diagnosis = examine(the_robot, scenario)
     if as_json:
         findings = [asdict(finding) | {"severity": finding.severity.value} for finding in diagnosis.findings]
         data = {"task": name, "robot": the_robot.name, "hopeless": diagnosis.hopeless, "findings": findings}
@@ -184,7 +188,7 @@ def solve(
         str,
         typer.Option(
             "--robot",
-            help="Bundled robot by name, or a robot's folder. [ironcub, or the file's]",
+            help="Bundled robot by name, or a robot's folder. [the task's, or ironcub]",
             autocompletion=completion.robots_or_folders,
         ),
     ] = "",
@@ -221,7 +225,7 @@ def solve(
 
     Example: multimodal-to solve --resume results/take-off/checkpoint.npz
     """
-    task = given(name, settings, robot, paper=paper, warm_start=warm_start, resume=resume)
+    task = given(name, settings, robot, paper=paper, warm_start=warm_start, resume=resume, quiet=quiet)
     scenario = task.scenario
     solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit, linear_solver=linear_solver)
     chosen_solver = choose(linear_solver)  # before anything takes time
@@ -341,7 +345,7 @@ def reproduce_scenarios(
     asked = names or SCENARIOS
     tasks = [(find(name), Formulation.executable(), writable(output / name)) for name in asked]
     tasks += [(as_in_paper(name), Formulation.paper(), writable(output / f"{name}-paper")) for name in asked]
-    robot = load_robot("ironcub")
+    robot = load_robot(DEFAULT_ROBOT)
 
     from multimodal_to.files.writing import write_text
     from multimodal_to.reporting.comparison import AUDITS, SOLVES, markdown, table

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
 
-from multimodal_to.cli.common import chosen
+from multimodal_to.cli.common import chosen, robot_for
 from multimodal_to.errors import InputError, ScenarioError
+from multimodal_to.models.robot import load_robot
 from multimodal_to.ocp import Formulation
 from multimodal_to.scenarios.data import stored
 from multimodal_to.scenarios.files import change
@@ -35,16 +36,18 @@ def given(
     paper: bool,
     warm_start: Path | None,
     resume: Path | None,
+    quiet: bool = False,
 ) -> Task:
     """Return the task that the options of `solve` ask for.
 
     Args:
         name: of a bundled scenario, or its TOML file.
         settings: changes as `KEY=VALUE`.
-        robot: name or folder; empty for the file's own, or the iRonCub.
+        robot: name or folder; empty for the scenario's, the file's own, or the iRonCub.
         paper: whether it is the paper's own formulation.
         warm_start: trajectory file of a similar task.
         resume: checkpoint or trajectory file of an unfinished solve.
+        quiet: whether nothing is said of which robot is taken.
 
     Raises:
         InputError: they contradict each other, or none of them is a task.
@@ -55,9 +58,9 @@ def given(
             raise InputError("nothing to solve; expected the NAME of a scenario, or --resume FILE")
         start = None if warm_start is None else Trajectory.load(warm_start)
         formulation = Formulation.paper() if paper else Formulation.executable()
-        return Task(
-            scenario=chosen(name, settings, paper=paper), robot=robot or "ironcub", formulation=formulation, start=start
-        )
+        asked = chosen(name, settings, paper=paper)
+        whose = robot_for(asked, robot, file="" if quiet else name)
+        return Task(scenario=asked, robot=whose, formulation=formulation, start=start)
     if warm_start is not None:
         raise InputError("--resume and --warm-start both say what to start from; expected one of them")
     start = Trajectory.load(resume)
@@ -77,7 +80,8 @@ def given(
     asked = (
         change(scenario, settings or ()) if name is None else chosen(name, settings, paper=start.rule == BACKWARD_EULER)
     )
-    if asked != scenario:
+    the_robot = load_robot(robot or start.robot)
+    if replace(asked.for_robot(the_robot), robot=None) != replace(scenario, robot=None):
         raise InputError(
             f"'{resume}' is of '{scenario.name}' with other values than asked for; --resume goes on with its own, "
             "--warm-start starts a changed task from it"
