@@ -80,14 +80,14 @@ def given(
     asked = (
         change(scenario, settings or ()) if name is None else chosen(name, settings, paper=start.rule == BACKWARD_EULER)
     )
-    the_robot = load_robot(robot or start.robot)
-    if replace(asked.for_robot(the_robot), robot=None) != replace(scenario, robot=None):
+    whose = robot or ("" if name is None else asked.robot) or start.robot  # no path that the file alone names
+    if replace(asked.for_robot(load_robot(whose)), robot=None) != replace(scenario, robot=None):
         raise InputError(
             f"'{resume}' is of '{scenario.name}' with other values than asked for; --resume goes on with its own, "
             "--warm-start starts a changed task from it"
         )
     formulation = Formulation.of_rule(start.rule)
-    return Task(scenario=scenario, robot=robot or start.robot, formulation=formulation, start=start)
+    return Task(scenario=scenario, robot=whose, formulation=formulation, start=start)
 
 
 def free_checkpoint(folder: Path, resume: Path | None, console: Console) -> Path:
