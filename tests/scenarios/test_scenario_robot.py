@@ -12,6 +12,7 @@ from commands import run
 from hopper import hop
 from hopper import hopper as make_hopper
 from multimodal_to.errors import ScenarioError
+from synthetic import take_off as synthetic_take_off
 
 JUMP = """
 based_on = "jump"
@@ -104,3 +105,52 @@ def test_a_solve_takes_the_robot_of_its_task(folder):
     assert mt.Trajectory.load(folder / "out" / "trajectory.npz").robot.endswith("hopper")
     again = run("solve", "--resume", folder / "out" / "trajectory.npz", folder / "hop.toml", "--no-pictures")
     assert again.returncode == 0, again.stderr
+
+
+def test_a_motion_starts_in_the_measured_state_of_a_file(folder):
+    robot = mt.load_robot(folder / "machines" / "hopper")
+    first = mt.solve(mt.build(robot, hop(robot))).trajectory
+    first.save(folder / "first.npz")
+    again = replace(
+        hop(robot, final_com=(0.1, 0.0, 0.6)),
+        start=None,
+        initial_com=None,
+        robot="machines/hopper",
+        initial_state="first.npz",
+        initial_knot=24,
+        knots=20,
+    )
+    assert again.start is mt.Start.GIVEN
+    mt.scenario_files.save(again, folder / "again.toml")
+    result = run("solve", folder / "again.toml", "-o", folder / "out", "--no-pictures")
+    assert result.returncode == 0, result.stdout + result.stderr
+    motion = mt.Trajectory.load(folder / "out" / "trajectory.npz")
+    measured, planned = mt.state_at(first, first.time[24]), mt.state_at(motion, 0.0)
+    for name in ("base_position", "joint_positions", "base_linear_velocity", "thrust", "thrust_rate"):
+        assert getattr(planned, name) == pytest.approx(getattr(measured, name), abs=1e-6), name
+    resumed = run("solve", "--resume", folder / "out" / "trajectory.npz", folder / "again.toml", "--no-pictures")
+    assert resumed.returncode == 0, resumed.stdout + resumed.stderr
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"initial_knot": 99}, "initial_knot is 99; 'first.npz' has the knots 0 to 20"),
+        ({"initial_state": "second.npz"}, "second.npz"),
+    ],
+)
+def test_a_state_that_is_not_there_is_refused_by_the_doctor_too(ironcub, tmp_path, monkeypatch, changes, sentence):
+    monkeypatch.chdir(tmp_path)
+    synthetic_take_off(ironcub).save("first.npz")
+    task = replace(mt.scenarios.take_off(), start=None, **{"initial_state": "first.npz", **changes})
+    with pytest.raises(mt.MultimodalError) as error:
+        mt.build(ironcub, task)
+    assert sentence in str(error.value)
+    assert sentence in mt.doctor(ironcub, task).findings[0].found
+
+
+def test_a_state_and_another_start_contradict_each_other():
+    with pytest.raises(ScenarioError, match="initial_state says how it starts, and start is 'hover'"):
+        replace(mt.scenarios.landing(), initial_state="first.npz")
+    with pytest.raises(ScenarioError, match="initial_knot is of no file"):
+        replace(mt.scenarios.landing(), initial_knot=3)

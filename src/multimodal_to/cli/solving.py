@@ -233,11 +233,12 @@ def solve(
     the_robot = load_robot(task.robot)
     if resume is not None and task.start is not None:
         the_robot = under_conditions(the_robot, task.start)
-    diagnosis = examine(the_robot, scenario, task.formulation)
+    diagnosis = examine(the_robot, scenario, task.formulation, initial=task.initial)
     _refuse_hopeless(diagnosis, console, force)
     folder = writable(output or (Path("results") / scenario.name if resume is None else resume.parent))
     started = time.perf_counter()
-    problem = build(the_robot, scenario, task.formulation)
+    problem = build(the_robot, scenario, task.formulation, initial=task.initial)
+    scenario = problem.scenario  # with numbers for all that is said from home or from a state
     the_robot = problem.robot  # with the jets that the scenario uses
     check_allowances(the_robot, scenario)  # so that a wrong name ends before the solve
     console.print(

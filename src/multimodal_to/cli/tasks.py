@@ -10,12 +10,14 @@ from rich.console import Console
 from multimodal_to.cli.common import chosen, robot_for
 from multimodal_to.errors import InputError, ScenarioError
 from multimodal_to.models.robot import load_robot
+from multimodal_to.models.state import State
 from multimodal_to.ocp import Formulation
 from multimodal_to.scenarios.data import stored
 from multimodal_to.scenarios.files import change
-from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.scenarios.scenario import Scenario, Start
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.rules import BACKWARD_EULER
+from multimodal_to.trajectory.states import state_at
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,6 +28,7 @@ class Task:
     robot: str
     formulation: Formulation
     start: Trajectory | None
+    initial: State | None = None  # that an unfinished solve with a given start starts in
 
 
 def given(
@@ -81,13 +84,17 @@ def given(
         change(scenario, settings or ()) if name is None else chosen(name, settings, paper=start.rule == BACKWARD_EULER)
     )
     whose = robot or ("" if name is None else asked.robot) or start.robot  # no path that the file alone names
-    if replace(asked.for_robot(load_robot(whose)), robot=None) != replace(scenario, robot=None):
+    asked = replace(asked.for_robot(load_robot(whose)), robot=None)
+    initial = state_at(start, 0.0) if scenario.start is Start.GIVEN else None
+    if initial is not None and asked.start is Start.GIVEN:
+        asked = replace(asked, initial_state=None, initial_knot=None, initial_com=scenario.initial_com)
+    if asked != replace(scenario, robot=None):
         raise InputError(
             f"'{resume}' is of '{scenario.name}' with other values than asked for; --resume goes on with its own, "
             "--warm-start starts a changed task from it"
         )
     formulation = Formulation.of_rule(start.rule)
-    return Task(scenario=scenario, robot=whose, formulation=formulation, start=start)
+    return Task(scenario=scenario, robot=whose, formulation=formulation, start=start, initial=initial)
 
 
 def free_checkpoint(folder: Path, resume: Path | None, console: Console) -> Path:

@@ -11,7 +11,9 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.doctor.turbines import greatest_held
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Posture, Robot
+from multimodal_to.models.state import State
 from multimodal_to.models.terrain import FlatGround, Plane
+from multimodal_to.ocp import given, rebinding
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.guess import standing_posture
 from multimodal_to.ocp.parameters import Parameters
@@ -26,22 +28,37 @@ class Task:
     robot: Robot
     scenario: Scenario
     formulation: Formulation
+    initial: State | None = None  # that a motion with a given start starts in
 
     @classmethod
-    def of(cls, robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> Task:
+    def of(
+        cls,
+        robot: Robot,
+        scenario: Scenario,
+        formulation: Formulation | None = None,
+        initial: State | None = None,
+    ) -> Task:
         """Return a scenario for a robot, whose jets are left out if the scenario leaves them off.
 
         Args:
             robot: whose motion it is.
             scenario: the task.
             formulation: what the problem is made of; by default `Formulation.executable()`.
+            initial: the state that a motion with a given start starts in; by default that of the scenario's file.
 
         Raises:
             ScenarioError: a keyframe names a joint or a frame that the robot lacks, or contradicts another.
+            TrajectoryError: the file of the state that it starts in is missing or broken.
+            InputError: that state is of another robot.
         """
         scenario = scenario.for_robot(robot)
         robot = robot if scenario.jets else robot.with_jets(())
-        return cls(robot=robot, scenario=scenario, formulation=formulation or Formulation.executable())
+        initial = initial or given.measured(scenario)
+        if initial is not None:
+            initial.refuse_other_robot(robot)
+            scenario = rebinding.started(robot, scenario, initial)
+        made_of = formulation or Formulation.executable()
+        return cls(robot=robot, scenario=scenario, formulation=made_of, initial=initial)
 
     # ---------------------------------------------------------------- time
 

@@ -33,15 +33,18 @@ def build(
         robot: whose motion it is.
         scenario: the task.
         formulation: what the problem is made of; by default `Formulation.executable()`.
-        initial: the state to start in, for a scenario whose start is `Start.GIVEN`; its CoM becomes `initial_com`.
+        initial: the state to start in, for a scenario whose start is `Start.GIVEN`; its CoM becomes `initial_com`. By
+            default it is that of the file `initial_state` of the scenario.
 
     Raises:
         ScenarioError: the scenario contradicts itself or does not fit the robot, or its start lacks a state.
+        TrajectoryError: the file of that state is missing or broken.
         InputError: there is a state for a scenario with another start, or it is of another robot.
         FormulationError: a term does not return what it has to, or is not a number at the start guess.
     """
     formulation = formulation or Formulation.executable()
     scenario = scenario.for_robot(robot)
+    initial = initial or given.measured(scenario)
     robot, standing = prepared(robot, scenario)
     given.check(robot, scenario, initial)
     scenario = rebinding.started(robot, scenario, initial)

@@ -107,7 +107,7 @@ def same_terms(scenario: Scenario, other: Scenario) -> bool:
 
 
 def started(robot: Robot, scenario: Scenario, initial: State | None) -> Scenario:
-    """Return a scenario with the CoM of the state that it starts in, if it starts in a given one.
+    """Return a scenario with the CoM of the state that it starts in, in place of its file, if it starts in a given one.
 
     Args:
         robot: with the jets that the scenario uses.
@@ -117,7 +117,7 @@ def started(robot: Robot, scenario: Scenario, initial: State | None) -> Scenario
     if initial is None:
         return scenario
     x, y, z = (float(value) for value in given.com(robot, initial))
-    return replace(scenario, initial_com=(x, y, z))
+    return replace(scenario, initial_com=(x, y, z), initial_com_shift=None, initial_state=None, initial_knot=None)
 
 
 def stacked(bounds: Bounds, layout: Layout, scenario: Scenario, scale: Array) -> tuple[Array, Array]:

@@ -37,7 +37,7 @@ def load(path: str | os.PathLike[str]) -> Scenario:
     source = Path(path)
     table = read_toml(source, ScenarioError)
     try:
-        return _with_robot(_scenario(table, source.stem), source.parent)
+        return _beside(_scenario(table, source.stem), source.parent)
     except MultimodalError as error:
         raise ScenarioError(f"{source}: {error}") from error
 
@@ -77,16 +77,19 @@ EMPTIED: Mapping[str, Callable[[], Any]] = FrozenMapping(
 """What a file can write anew with `replace`, and what stands there before it does."""
 
 
-def _with_robot(scenario: Scenario, folder: Path) -> Scenario:
-    """Return a scenario with its robot's folder as it is from here, where it is not a bundled robot.
+def _beside(scenario: Scenario, folder: Path) -> Scenario:
+    """Return a scenario with the paths that its file says as they are from here.
 
     Args:
         scenario: as its file says it.
         folder: of that file.
     """
-    if scenario.robot is None or scenario.robot in bundled_robots():
-        return scenario
-    return replace(scenario, robot=str(folder / scenario.robot))
+    paths: dict[str, Any] = {}
+    if scenario.robot is not None and scenario.robot not in bundled_robots():
+        paths["robot"] = str(folder / scenario.robot)
+    if scenario.initial_state is not None:
+        paths["initial_state"] = str(folder / scenario.initial_state)
+    return replace(scenario, **paths) if paths else scenario
 
 
 @checked

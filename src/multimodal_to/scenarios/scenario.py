@@ -185,6 +185,10 @@ class Scenario:
     """How the motion ends; by default as the keyframe of the end says, which there has to be then."""
     keyframes: tuple[Keyframe, ...] = ()
     """What is asked of the motion at chosen knots, beside its start and its end."""
+    initial_state: str | None = None
+    """Trajectory file with the state that the motion starts in, in a file relative to that file; the start is given."""
+    initial_knot: int | None = None
+    """Which knot of that file it starts in, the last one by default [1]."""
     robot: str | None = None
     """The robot that it is for: a bundled one by name, or a robot's folder, in a file relative to that file."""
     mid_height_min: float | None = None
@@ -312,6 +316,12 @@ class Scenario:
             [one for one in self.keyframes if one.weight is None and one.at(self.knots) == knot]
             for knot in (0, self.knots)
         )
+        if self.initial_state is not None:
+            if self.start not in (None, Start.GIVEN):
+                raise ScenarioError(f"initial_state says how it starts, and start is '{word(self.start)}'")
+            object.__setattr__(self, "start", Start.GIVEN)
+        elif self.initial_knot is not None:
+            raise ScenarioError("initial_knot is of no file; expected initial_state beside it")
         if self.start is None:
             object.__setattr__(self, "start", Start.HOVER if any(one.hover for one in first) else Start.STANDING)
         if self.terminal is None and not last:
