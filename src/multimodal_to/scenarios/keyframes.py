@@ -378,5 +378,7 @@ def _refuse_negative(name: str, number: float) -> None:
 
 def asked_of(keyframe: Keyframe) -> tuple[str, ...]:
     """Return the names of the fields with which a keyframe asks for something."""
-    names = (entry.name for entry in fields(keyframe))
-    return tuple(name for name in names if name not in _ABOUT and getattr(keyframe, name) not in (None, False, {}, ()))
+    values = {entry.name: getattr(keyframe, entry.name) for entry in fields(keyframe) if entry.name not in _ABOUT}
+    return tuple(
+        name for name, value in values.items() if value or (isinstance(value, float | int) and value is not False)
+    )
