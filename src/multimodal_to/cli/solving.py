@@ -274,7 +274,7 @@ def solve(
 
 def _repeat(console: Console, solution: Solution, diagnosis: Diagnosis) -> None:
     """Say again what the doctor said, where there is no answer."""
-    if solution.status in (Status.INFEASIBLE, Status.FAILED):
+    if not solution.status.solved and solution.status is not Status.STOPPED:
         for finding in diagnosis.of(Severity.ERROR) + diagnosis.of(Severity.WARNING):
             console.print(f"the doctor said: {finding}", soft_wrap=True)
 

@@ -18,6 +18,7 @@ from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.guess import standing_posture
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import Constraint
+from multimodal_to.ocp.waypoints import com as com_path
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 
 
@@ -76,13 +77,23 @@ class Task:
 
     @cached_property
     def hovers(self) -> dict[str, Vector3]:
-        """Return where the CoM has to hover [m], by when."""
+        """Return where the CoM has to hover [m], by when; about where, if a keyframe does not say all of it."""
         scenario, where = self.scenario, dict[str, Vector3]()
         if scenario.start is Start.HOVER:
             where["start"] = scenario.start_com
+        for one in scenario.own_keyframes():
+            if one.keyframe.hover and 0 < one.knot < scenario.knots:
+                x, y, z = (float(value) for value in com_path(scenario)[:, one.knot])
+                where[one.label] = x, y, z
         if scenario.terminal is Terminal.HOVER:
             where["end"] = scenario.end_com
         return where
+
+    @property
+    def first_hover(self) -> int | None:
+        """Return the first knot after the start that hovers, if there is one."""
+        knots = [one.knot for one in self.scenario.placed() if one.knot and one.keyframe.hover]
+        return min(knots, default=None)
 
     @cached_property
     def thrusts_held(self) -> Array:
