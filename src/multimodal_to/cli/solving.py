@@ -40,16 +40,17 @@ from multimodal_to.doctor import doctor as examine
 from multimodal_to.errors import InputError, ScenarioError, apart
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.native import missing
-from multimodal_to.ocp import Formulation, build
+from multimodal_to.ocp import Formulation, Problem, build
 from multimodal_to.ocp.integration import LEAPFROG
 from multimodal_to.scenarios import SCENARIOS, find
 from multimodal_to.scenarios import paper as as_in_paper
 from multimodal_to.scenarios.data import stored, to_dict
 from multimodal_to.scenarios.files import change, to_toml
 from multimodal_to.scenarios.scenario import Scenario, word
-from multimodal_to.solving import Ipopt, Relaxation, Solution, Status, relax
+from multimodal_to.solving import Ipopt, Solution, Status, relax
 from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
+from multimodal_to.solving.relaxation import GIVES_WAY, PHYSICS
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.derived import largest_torques
@@ -263,7 +264,7 @@ def solve(
     _summarise(console, solution, report)
     _repeat(console, solution, diagnosis)
     if explain and not solution.status.solved and not progress.interrupted:
-        _explain(console, relax(problem, solution.trajectory, solver))
+        written += _explain(console, problem, solution, solver, folder)
     if not (no_pictures or progress.interrupted):  # who stops a solve does not want to wait for pictures
         written += _draw(the_robot, solution.trajectory, folder)
     for path in written:
@@ -279,15 +280,34 @@ def _repeat(console: Console, solution: Solution, diagnosis: Diagnosis) -> None:
             console.print(f"the doctor said: {finding}", soft_wrap=True)
 
 
-def _explain(console: Console, relaxation: Relaxation) -> None:
-    """Say what has to give way, or that nothing has to."""
-    spent = f"{relaxation.iterations} iterations in {relaxation.solve_time:.1f} s"
-    if not relaxation.status.solved:
-        console.print(f"explain: found nothing for certain in {spent}: {relaxation.status.value}", soft_wrap=True)
-    elif not relaxation.gives_way:
-        console.print(f"explain: nothing has to give way, all rows can be met together ({spent})", soft_wrap=True)
-    for some in relaxation.gives_way:
+def _explain(console: Console, problem: Problem, solution: Solution, solver: Ipopt, folder: Path) -> list[Path]:
+    """Say what has to give way, or that nothing has to; then keep the motion that shows it, and return its path.
+
+    Args:
+        console: that it is said on.
+        problem: without an answer.
+        solution: where its solve ended.
+        solver: whose limits hold.
+        folder: of the results.
+    """
+    found = relax(problem, solution.trajectory, solver)
+    if not found.status.solved or found.price >= PHYSICS * GIVES_WAY:  # where the solve ended may be a bad place
+        again = relax(problem, solver=solver)
+        found = min(found, again, key=lambda one: (not one.status.solved, one.price))
+    spent = f"{found.iterations} iterations in {found.solve_time:.1f} s"
+    if not found.status.solved:
+        console.print(f"explain: found nothing for certain in {spent}: {found.status.value}", soft_wrap=True)
+    for some in found.gives_way:
         console.print(f"explain: gives way: {some}", soft_wrap=True)
+    if found.gives_way or not found.status.solved:
+        return []
+    path = found.trajectory.save(folder / "explained.npz")
+    console.print(
+        f"explain: nothing has to give way, all rows can be met together ({spent}): the task is feasible, and the "
+        f"start guess led the solver astray; --warm-start {path} starts from a motion that meets them",
+        soft_wrap=True,
+    )
+    return [path]
 
 
 def _draw(robot: Robot, trajectory: Trajectory, folder: Path) -> list[Path]:

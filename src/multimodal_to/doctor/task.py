@@ -13,13 +13,14 @@ from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.state import State
 from multimodal_to.models.terrain import FlatGround, Plane
-from multimodal_to.ocp import given, rebinding
+from multimodal_to.ocp import given, paper, rebinding
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.guess import standing_posture
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import Constraint
 from multimodal_to.ocp.waypoints import com as com_path
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
+from multimodal_to.trajectory import rules
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,6 +73,12 @@ class Task:
     def moving_intervals(self) -> int:
         """Return over how many intervals the CoM can move: one that ends at rest stands still over the last two."""
         return self.scenario.knots - (0 if self.scenario.terminal is Terminal.FREE else 2)
+
+    @property
+    def rests_first(self) -> bool:
+        """Return whether the CoM stands still over the first interval: from rest and equilibrium, by leapfrog."""
+        by_rest = self.scenario.start is not Start.GIVEN and bool(self.held(paper.STATIC_EQUILIBRIUM))
+        return by_rest and bool(rules.instant(self.formulation.rule.name, "com_velocity"))
 
     # ---------------------------------------------------------------- in the air
 

@@ -56,12 +56,14 @@ def _between_keyframes(task: Task) -> list[tuple[str, float, int]]:
         known: tuple[str, int, float, float] | None = None
         for one in sorted(task.scenario.placed(), key=lambda some: some.knot):
             asked = [limits[1:] for limits in one.keyframe.limits() if limits[0] == f"CoM {axis} [m]"]
-            if one.keyframe.weight is not None or not asked:
+            if one.keyframe.weight is not None or not asked or one.label == "middle":
                 continue
             low, high = max(least for least, _ in asked), min(most for _, most in asked)
-            if known is not None and one.label.startswith("keyframe") and one.knot > known[1]:
-                way = max(low - known[3], known[2] - high, 0.0)
-                stretches.append((f"along {axis} from {known[0]} to {one.label}", way, one.knot - known[1]))
+            if known is not None and one.knot > known[1] and {one.label, known[0]} != {"start", "end"}:
+                way, intervals = max(low - known[3], known[2] - high, 0.0), one.knot - known[1]
+                intervals -= known[0] == "start" and task.rests_first
+                intervals -= task.scenario.knots - task.moving_intervals if one.label == "end" else 0
+                stretches.append((f"along {axis} from {known[0]} to {one.label}", way, intervals))
             known = one.label, one.knot, low, high
     return stretches
 
