@@ -101,7 +101,9 @@ def test_start_and_end_are_taken_from_their_keyframes():
         ),
     )
     assert (task.start, task.terminal) == (mt.Start.HOVER, mt.Terminal.STANDING)
-    assert (task.initial_com, task.final_com) == ((0.0, 0.0, 0.7), "home")
+    assert (task.start_com, task.initial_com, task.final_com) == ((0.0, 0.0, 0.7), None, None)
+    moved = replace(task, keyframes=(mt.Keyframe(when="start", com=(0.0, 0.1, 0.7), hover=True), task.keyframes[1]))
+    assert moved.start_com == (0.0, 0.1, 0.7)
     free = replace(
         task, terminal=None, final_com=None, keyframes=(*task.keyframes[:1], mt.Keyframe(when="end", yaw=0.1))
     )

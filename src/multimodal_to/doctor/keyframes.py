@@ -117,7 +117,7 @@ def stands(task: Task) -> Iterator[Symptom]:
     scenario, robot = task.scenario, task.robot
     for one in _in_order(task):
         com = one.keyframe.com
-        if not one.keyframe.standing or not 0 < one.knot < scenario.knots or not isinstance(com, tuple):
+        if not one.keyframe.standing or one.knot in (0, scenario.knots) or not isinstance(com, tuple):
             continue
         reach = float(robot.contact_reach[2])
         if isinstance(scenario.surface, FlatGround) and task.held(paper.CONTACT_REACH):

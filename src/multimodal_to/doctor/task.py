@@ -88,8 +88,8 @@ class Task:
         scenario, where = self.scenario, dict[str, Vector3]()
         if scenario.start is Start.HOVER:
             where["start"] = scenario.start_com
-        for one in scenario.own_keyframes():
-            if one.keyframe.hover and 0 < one.knot < scenario.knots:
+        for one in scenario.keyframes_between():
+            if one.keyframe.hover:
                 x, y, z = (float(value) for value in com_path(scenario)[:, one.knot])
                 where[one.label] = x, y, z
         if scenario.terminal is Terminal.HOVER:

@@ -212,7 +212,7 @@ def _travelled(scenario: Scenario) -> Array:
     """
     share = np.linspace(0.0, 1.0, scenario.knots + 1)
     start = np.array(scenario.start_com)
-    if not scenario.keyframes:
+    if not scenario.keyframes_between():
         progress = np.minimum(share / LANDED, 1.0) if _lands(scenario) else share
         return np.asarray((np.array(scenario.end_com) - start)[:, None] * progress)
     return np.asarray(waypoints.com(scenario, early=LANDED if _lands(scenario) else 1.0) - start[:, None])
@@ -227,7 +227,7 @@ def _weight_flown(robot: Robot, scenario: Scenario) -> Array:
     share = np.linspace(0.0, 1.0, scenario.knots + 1)
     if not robot.jets:
         return np.zeros_like(share)
-    if any(one.keyframe.hover or one.keyframe.standing for one in scenario.own_keyframes()):
+    if any(one.keyframe.hover or one.keyframe.standing for one in scenario.keyframes_between()):
         return waypoints.flown(scenario)
     if scenario.start is not Start.STANDING:
         return np.minimum((1.0 - share) / (1.0 - LANDED), 1.0) if _lands(scenario) else np.ones_like(share)

@@ -247,9 +247,11 @@ class Scenario:
         Raises:
             ScenarioError: it is said from a robot's home, see `for_robot`, or a state will say it.
         """
-        if self.initial_com is None or isinstance(self.initial_com, str):
+        asked = [self.initial_com, *(one.com for one in self._held_at(0))]
+        found = next((com for com in asked if isinstance(com, tuple)), None)
+        if found is None:
             raise ScenarioError("initial_com is no position yet; expected a scenario of `for_robot`")
-        return self.initial_com
+        return found
 
     @property
     def end_com(self) -> Vector3:
@@ -306,22 +308,22 @@ class Scenario:
             for index, keyframe in enumerate(self.keyframes, 1)
         )
 
+    def keyframes_between(self) -> tuple[Placed, ...]:
+        """Return those of `keyframes` that are neither at the first knot nor at the last."""
+        return tuple(one for one in self.own_keyframes() if 0 < one.knot < self.knots)
+
     def placed(self) -> tuple[Placed, ...]:
         """Return every keyframe at its knot: those with a short name, then those of `keyframes`."""
         return (*self.short_keyframes(), *self.own_keyframes())
 
+    def _held_at(self, knot: int) -> list[Keyframe]:
+        """Return those of `keyframes` that hold at a knot."""
+        return [one for one in self.keyframes if one.weight is None and one.at(self.knots) == knot]
+
     def _take_ends(self) -> None:
-        """Take how it starts and ends, and the CoM there, from the keyframes of the first and last knots."""
-        first, last = (
-            [one for one in self.keyframes if one.weight is None and one.at(self.knots) == knot]
-            for knot in (0, self.knots)
-        )
-        if self.initial_state is not None:
-            if self.start not in (None, Start.GIVEN):
-                raise ScenarioError(f"initial_state says how it starts, and start is '{word(self.start)}'")
-            object.__setattr__(self, "start", Start.GIVEN)
-        elif self.initial_knot is not None:
-            raise ScenarioError("initial_knot is of no file; expected initial_state beside it")
+        """Take how it starts and ends from the keyframes of the first and last knots, which have to say it then."""
+        first, last = self._held_at(0), self._held_at(self.knots)
+        self._take_state()
         if self.start is None:
             object.__setattr__(self, "start", Start.HOVER if any(one.hover for one in first) else Start.STANDING)
         if self.terminal is None and not last:
@@ -330,26 +332,31 @@ class Scenario:
             hovers, stands = (any(getattr(one, name) for one in last) for name in ("hover", "standing"))
             ends = Terminal.HOVER if hovers else Terminal.STANDING if stands else Terminal.FREE
             object.__setattr__(self, "terminal", ends)
-        self._take_com("initial_com", first)
-        self._take_com("final_com", last)
+        self._take_shift("initial_com")
+        self._take_shift("final_com")
         if self.initial_com is None and self.start is Start.GIVEN:
             object.__setattr__(self, "initial_com", HOME)  # until the state says it
-        if self.initial_com is None:
+        if self.initial_com is None and not any(one.of_home or isinstance(one.com, tuple) for one in first):
             raise ScenarioError("the scenario lacks 'initial_com', or a keyframe for its start with a whole 'com'")
         if self.final_com is None and not last:
             raise ScenarioError("the scenario lacks 'final_com', or a keyframe for its end")
 
-    def _take_com(self, name: str, here: list[Keyframe]) -> None:
-        """Take the CoM of an end from home, where only a shift is given, or from the keyframes there."""
+    def _take_state(self) -> None:
+        """Let a motion that starts in the state of a file start as given."""
+        if self.initial_state is not None:
+            if self.start not in (None, Start.GIVEN):
+                raise ScenarioError(f"initial_state says how it starts, and start is '{word(self.start)}'")
+            object.__setattr__(self, "start", Start.GIVEN)
+        elif self.initial_knot is not None:
+            raise ScenarioError("initial_knot is of no file; expected initial_state beside it")
+
+    def _take_shift(self, name: str) -> None:
+        """Take the CoM of an end from home, where only a shift is given."""
         com, shift = getattr(self, name), getattr(self, f"{name}_shift")
         if shift is not None and com is None:
             object.__setattr__(self, name, HOME)
         elif shift is not None and com != HOME:
             raise ScenarioError(f"{name}_shift is from home's CoM, and {name} has numbers; expected one of them")
-        whole = [one for one in here if one.of_home or isinstance(one.com, tuple)]
-        if getattr(self, name) is None and whole:
-            object.__setattr__(self, name, HOME if whole[0].of_home else whole[0].com)
-            object.__setattr__(self, f"{name}_shift", whole[0].com_shift)
 
     def _check_keyframes(self) -> None:
         """Refuse keyframes outside of the horizon, and those that contradict each other."""
