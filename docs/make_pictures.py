@@ -1,8 +1,8 @@
 """Draw the pictures of the README and set its table of results: python docs/make_pictures.py.
 
-Both come from what `multimodal-to reproduce` wrote to results/, and the snapshots of `OF_EXAMPLES` from what examples wrote
-there. The README has the first of its two tables, with its
-note; docs/results.md has both. Needs Chromium (`apt-get install chromium`), which takes the snapshots, and
+Both come from what `multimodal-to reproduce` wrote to results/, and the snapshots of `OF_EXAMPLES` from what examples
+wrote there. The README has the first of the two tables, with its note; docs/results.md has both. Needs Chromium
+(`apt-get install chromium`), which takes the snapshots, and
 icub-models (`pip install '.[meshes]'`).
 """
 

@@ -8,7 +8,7 @@ import numpy as np
 import multimodal_to as mt
 from multimodal_to.replay import write_html
 
-HAND, POINT = "l_arm_jet_turbine", (-0.33, -0.29, 0.92)  # ahead of the robot, on its left, 0.28 m above where the hand hangs [m]
+HAND, POINT = "l_arm_jet_turbine", (-0.33, -0.29, 0.92)  # 0.28 m above where the hand hangs [m]
 reach = replace(
     mt.scenarios.landing(),
     name="reach",

@@ -86,9 +86,9 @@ def _beside(scenario: Scenario, folder: Path) -> Scenario:
     """
     paths: dict[str, Any] = {}
     if scenario.robot is not None and scenario.robot not in bundled_robots():
-        paths["robot"] = str(folder / scenario.robot)
+        paths["robot"] = os.path.abspath(folder / scenario.robot)
     if scenario.initial_state is not None:
-        paths["initial_state"] = str(folder / scenario.initial_state)
+        paths["initial_state"] = os.path.abspath(folder / scenario.initial_state)
     return replace(scenario, **paths) if paths else scenario
 
 
