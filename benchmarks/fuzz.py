@@ -422,6 +422,35 @@ def trajectory_file(robot: mt.Robot, folder: Path) -> bytes:
     return trajectory.save(folder / "valid.npz").read_bytes()
 
 
+KEYFRAMES = """
+based_on = "take-off"
+replace = ["weights.joint_velocities", "margins"]
+robot = "ironcub"
+initial_com = "home"
+final_com_shift = [0.0, 0.0, 0.13]
+[[keyframes]]
+when = 0.25
+com = {z = 0.6}
+com_min = {x = -0.1}
+com_max = {x = 0.1}
+base_position.y = 0.0
+yaw = 0.1
+orientation_tolerance = 0.05
+joints.l_knee = -0.3
+joint_tolerance = 0.1
+frames.l_sole_1 = {position = [0.0, -0.1, 0.2], position_tolerance = 0.3, orientation = [0, 0, 0, 1]}
+momentum = {linear = [0, 0, 0], angular.z = 0.0}
+[[keyframes]]
+knot = 60
+com = "home"
+com_shift = [0.0, 0.0, 0.1]
+hover = true
+[[keyframes]]
+when = "end"
+base_orientation = [0.0, 0.0, 0.0, 1.0]
+weight = 2.0
+"""
+
 Source = tuple[str, bytes, tuple[Mutation, ...], Reader, float]
 """A file's name, valid content, what changes it, what reads it, and its share of the inputs."""
 
@@ -443,7 +472,7 @@ def sources(kind: str, folder: Path) -> list[Source]:
             for surface in (field_, Plane(slope=0.1), Stairs(edges=(0.1,), heights=(0.0, 0.1)))
         ]
         short = b'based_on = "take-off"\nfinal_com_height = 0.8\nweights.thrust = 3\nsurface = "flat"\n'
-        texts = [scenario_files.to_toml(task).encode() for task in tasks] + [short]
+        texts = [scenario_files.to_toml(task).encode() for task in tasks] + [short, KEYFRAMES.encode()]
         return [
             *(("task.toml", text, changes, read_scenario, 0.6 / len(texts)) for text in texts),
             ("robot.toml", ROBOT.encode(), changes, read_robot, 0.3),

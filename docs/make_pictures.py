@@ -1,7 +1,8 @@
 """Draw the pictures of the README and set its table of results: python docs/make_pictures.py.
 
-Both come from what `multimodal-to reproduce` wrote to results/. The README has the first of its two tables, with its
-note; docs/results.md has both. Needs Chromium (`apt-get install chromium`), which takes the snapshots, and
+Both come from what `multimodal-to reproduce` wrote to results/, and the snapshots of `OF_EXAMPLES` from what examples
+wrote there. The README has the first of the two tables, with its note; docs/results.md has both. Needs Chromium
+(`apt-get install chromium`), which takes the snapshots, and
 icub-models (`pip install '.[meshes]'`).
 """
 
@@ -16,6 +17,8 @@ from multimodal_to.replay import write_snapshots
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "results"
 HEIGHT, COLOURS = 400, 256  # of the snapshots of each scenario
+OF_EXAMPLES = {"turn": "ironcub", "reach": "ironcub", "slope": "ironcub", "side-step": ROOT / "examples" / "hopper"}
+"""The robots of the examples that have a picture, by what their results are called."""
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
 
 
@@ -39,6 +42,8 @@ def main() -> None:
             write_snapshots(robot, trajectory, ROOT / "docs" / "take-off.png")
     for name in mt.scenarios.SCENARIOS:
         draw_snapshots(robot, mt.Trajectory.load(RESULTS / name / "trajectory.npz"), name)
+    for name, robot_of_it in OF_EXAMPLES.items():
+        draw_snapshots(mt.load_robot(robot_of_it), mt.Trajectory.load(RESULTS / name / "trajectory.npz"), name)
     tables = (RESULTS / "table.md").read_text(encoding="utf-8")
     set_table(ROOT / "docs" / "results.md", tables)
     set_table(ROOT / "README.md", "\n\n".join(tables.split("\n\n")[:2]) + "\n")

@@ -23,6 +23,7 @@ from multimodal_to.models.robot import load_robot
 from multimodal_to.models.robot_keys import robot_keys
 from multimodal_to.models.terrain import MOST_NODES
 from multimodal_to.ocp import Constraint, Cost, Formulation, Parameters
+from multimodal_to.ocp import keyframes as asked
 from multimodal_to.replay.meshes import LARGEST_MESH
 from multimodal_to.scenarios import SCENARIOS
 from multimodal_to.scenarios.keys import scenario_keys
@@ -187,6 +188,28 @@ def keys(every: Iterable[Key]) -> str:
     )
 
 
+_OFF: Mapping[str, Callable[..., object]] = MappingProxyType(
+    {
+        "com": asked.off_com,
+        "base_position": asked.off_base_position,
+        "base_orientation": asked.off_orientation,
+        "yaw": asked.off_yaw,
+        "joints": asked.off_joints,
+        "frames[].position": asked.off_frame,
+        "frames[].orientation": asked.off_frame_orientation,
+        "momentum.linear": asked.off_linear_momentum,
+        "momentum.angular": asked.off_angular_momentum,
+    }
+)
+"""What a keyframe asks to be zero, by its field."""
+
+
+def keyframes() -> str:
+    """Return what keyframes ask for: the formula of each residual."""
+    rows = [(f"`{name}`", _first_paragraph(function.__doc__ or "")) for name, function in _OFF.items()]
+    return table(("field", "what is held within the tolerance of zero, or charged"), rows)
+
+
 # ---------------------------------------------------------------- the formulation
 
 
@@ -229,7 +252,11 @@ def terms() -> str:
 
 def _formula(term: Constraint | Cost) -> str:
     """Return the first paragraph of what a term's function says of itself."""
-    return " ".join(term.formula.split("\n\n")[0].split()).removesuffix(".")
+    return _first_paragraph(term.formula)
+
+
+def _first_paragraph(text: str) -> str:
+    return " ".join(text.split("\n\n")[0].split()).removesuffix(".")
 
 
 def _units(term: Constraint | Cost) -> str:
@@ -322,6 +349,7 @@ TABLES: Mapping[str, Callable[[], str]] = MappingProxyType(
         "properties": properties,
         "scenario keys": lambda: keys(scenario_keys()),
         "robot keys": lambda: keys(robot_keys()),
+        "keyframes": keyframes,
         "terms": terms,
         "rooms": rooms,
         "rooms picture": rooms_picture,

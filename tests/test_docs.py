@@ -16,6 +16,7 @@ from multimodal_to.auditing import PROPERTIES, Of
 from multimodal_to.files.reading import LARGEST_TOML
 from multimodal_to.models.joint_units import either
 from multimodal_to.models.terrain import SURFACES
+from multimodal_to.ocp import keyframes
 from multimodal_to.replay.meshes import LARGEST_MESH
 from multimodal_to.trajectory import ENTRIES, FORMATS, QUANTITIES, archive
 from test_layering import FLOORS
@@ -143,10 +144,24 @@ def test_every_term_of_the_paper_is_on_its_page_with_its_formula():
 
 def test_every_field_of_a_scenario_is_on_its_page():
     text = filled("reference/scenario.md")
-    prefixes = {"": mt.Scenario, "weights.": mt.Weights}
+    prefixes = {
+        "": mt.Scenario,
+        "weights.": mt.Weights,
+        "keyframes[].": mt.Keyframe,
+        "keyframes[].frames.<name>.": mt.FrameTarget,
+        "keyframes[].momentum.": mt.Momentum,
+    }
     names = [prefix + entry.name for prefix, kind in prefixes.items() for entry in fields(kind)]
     assert [name for name in names if f"| `{name}` | " not in text] == []
     assert f"one of {', '.join(SURFACES)}" in text
+
+
+def test_every_residual_of_a_keyframe_is_on_its_page_with_its_formula():
+    text = filled("reference/scenario.md")
+    known = [one for name, one in vars(keyframes).items() if name.startswith("off_")]
+    assert len(known) == 9
+    for function in known:
+        assert function.__doc__.split("\n")[0].rstrip(".") in text
 
 
 def test_every_key_of_the_bundled_robots_file_is_on_its_page():

@@ -26,7 +26,9 @@ from multimodal_to.ocp import (
     Cost,
     Formulation,
     Interval,
+    Intervals,
     Knot,
+    Knots,
     Parameters,
     Problem,
     Where,
@@ -35,8 +37,9 @@ from multimodal_to.ocp import (
     between,
     build,
     equal,
+    standing_posture,
 )
-from multimodal_to.scenarios import Margins, Scenario, Start, Terminal, Weights
+from multimodal_to.scenarios import FrameTarget, Keyframe, Margins, Momentum, Scenario, Start, Terminal, Weights
 from multimodal_to.scenarios import files as scenario_files
 from multimodal_to.solving import (
     Ending,
@@ -62,13 +65,18 @@ __all__ = [
     "Ending",
     "FlatGround",
     "Formulation",
+    "FrameTarget",
     "FrictionCone",
     "HeightField",
     "Interval",
+    "Intervals",
     "Ipopt",
+    "Keyframe",
     "KinDynComputations",
     "Knot",
+    "Knots",
     "Margins",
+    "Momentum",
     "MultimodalError",
     "Parameters",
     "Plane",
@@ -101,6 +109,7 @@ __all__ = [
     "scenario_files",
     "scenarios",
     "solve",
+    "standing_posture",
     "state_at",
     "sweep",
     "write_motion",

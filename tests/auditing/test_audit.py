@@ -14,7 +14,7 @@ from multimodal_to.auditing.properties import judged
 from multimodal_to.errors import InputError
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.terrain import FlatGround, Plane, Stairs
-from multimodal_to.scenarios import Start, Terminal
+from multimodal_to.scenarios import FrameTarget, Keyframe, Momentum, Start, Terminal
 from multimodal_to.trajectory import rules
 from synthetic import take_off as take_off_by_hand
 
@@ -151,12 +151,23 @@ def test_a_property_that_does_not_exist_is_refused_with_the_nearest_one(ironcub,
         report["slip under lode"]
 
 
+SOLE = FrameTarget(position={"z": 0.1}, orientation=(0.0, 0.0, 0.0, 1.0))
 CHANGES = {
     "as it is": {},
     "from a hover": {"start": Start.HOVER},
     "to a stand": {"terminal": Terminal.STANDING},
     "to a free end": {"terminal": Terminal.FREE},
     "over the middle": {"mid_height_min": 0.6},
+    "by way of keyframes": {
+        "keyframes": (
+            Keyframe(knot=20, standing=True, com_min={"z": 0.5}, yaw=0.0, base_position={"x": 0.0}),
+            Keyframe(
+                knot=60, hover=True, joints={"l_knee": -0.1}, momentum=Momentum(linear={"z": 0}, angular={"z": 0})
+            ),
+            Keyframe(knot=50, base_orientation=(0.0, 0.0, 0.0, 1.0), frames={"l_sole_1": SOLE}),
+            Keyframe(knot=40, com={"z": 0.9}, weight=1.0),
+        ),
+    },
 }
 
 

@@ -175,6 +175,21 @@ BROKEN = {
         "'surface'",
         "rows of one length",
     ),
+    "a keyframe of no time": toml("based_on = 'take-off'\n[[keyframes]]\nyaw = 1", "keyframes[0]", "'when' or 'knot'"),
+    "an unknown part of a keyframe": toml(
+        "based_on = 'take-off'\n[[keyframes]]\nknot = 3\nyaww = 1", "'keyframes[0].yaww'; did you mean"
+    ),
+    "a keyframe of two positions": toml(
+        "based_on = 'take-off'\n[[keyframes]]\nknot = 3\ncom = [0, 0]", "keyframes[0].com", "a list of 3"
+    ),
+    "a joint that no robot has": toml(
+        "based_on = 'take-off'\n[[keyframes]]\nknot = 3\njoints.tail = 1", "unknown joint 'tail'", error=None
+    ),
+    "a robot that is not there": toml("based_on = 'take-off'\nrobot = 'nobody'", "unknown robot", error=ModelError),
+    "a replacement of nothing": toml("replace = ['weights']", "expected 'based_on' beside it"),
+    "a state that is not there": toml(
+        "based_on = 'take-off'\nstart = 'given'\ninitial_state = 'nowhere.npz'", "nowhere.npz", error=None
+    ),
     "half a scenario": toml("title = 'half'", "the scenario lacks", "'knots'"),
     # robots
     "a URDF elsewhere": robot('"ironcub.urdf"', '"../../ironcub.urdf"', "'urdf' is", "outside the robot's folder"),

@@ -378,7 +378,7 @@ MADE_WRONG = {
     ),
     "no place": (
         lambda: replace(TURNS, charged=()),
-        "the term 'slow_turns': 'charged' is (); expected different members of Where",
+        "the term 'slow_turns': 'charged' is (); expected different members of Where, or Knots",
     ),
     "a weight below zero": (
         lambda: replace(TURNS, weight=-1.0),

@@ -148,7 +148,7 @@ def test_a_change_that_makes_no_scenario_is_refused_by_key_and_value(scenario, s
         ("knots = ", "is not valid TOML"),
         ('based_on = "takeoff"', "unknown scenario 'takeoff'; did you mean 'take-off'?"),
         ("based_on = 3", "'based_on' is 3; expected the name of a bundled scenario"),
-        ("knots = 5", "the scenario lacks 'title', 'initial_com'"),
+        ("knots = 5", "the scenario lacks 'title', 'interval_min'"),
         ("final_com_height = 0.8", "'final_com_height' changes 'final_com', which the scenario lacks"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -64,8 +65,13 @@ def test_every_key_of_the_list_is_read(key, tmp_path):
     base = 'based_on = "take-off"\n' if key.name != "based_on" else ""
     kind_too = f'surface.kind = "{kind}"\n' if kind else ""
     path = tmp_path / "task.toml"
-    path.write_text(f"{base}{kind_too}{key.name} = {wrong}\n", encoding="utf-8")
-    with pytest.raises(ScenarioError, match=rf"task.toml: '{key.name}' is '?(x|3)'?; expected"):
+    name = key.name.replace("<name>", "some")
+    here = name.removeprefix("keyframes[].")
+    head = "[[keyframes]]\n" + "knot = 3\n" * (here not in ("when", "knot")) if here != name else ""
+    path.write_text(f"{base}{kind_too}{head}{here} = {wrong}\n", encoding="utf-8")
+    named = re.escape(name.replace("[]", "[0]"))
+    said = rf"task.toml: ('{named}'|'keyframes.0.': {here}|{named}) is '?(x|3)'?; expected"
+    with pytest.raises(ScenarioError, match=said):
         load(path)
 
 
@@ -79,6 +85,7 @@ def test_a_required_key_is_missed(key):
 
 def test_all_other_keys_may_be_left_out():
     required = {key.name for key in KEYS if key.default == "required" and not key.where}
+    required |= {"initial_com", "final_com", "terminal"}  # which keyframes may say instead
     table = {name: value for name, value in to_dict(scenarios.take_off()).items() if name in required}
     assert from_dict({**table, "name": "bare", "weights": {}}).knots == scenarios.take_off().knots
 

@@ -55,13 +55,23 @@ def test_an_infeasible_end_names_rows_knot_component_and_amount(too_high, soluti
     assert str(worst).startswith(f"contact_reach at knot 10, {foot} z, by 0.1")
 
 
-def test_a_contradiction_is_told_by_the_fewest_rows_that_have_to_give_way(too_high, solution):
+def test_what_is_asked_gives_way_before_physics_and_by_as_much_as_it_asks_too_much(too_high, solution):
     relaxation = mt.relax(too_high, solution.trajectory)
     assert relaxation.status is mt.Status.OPTIMAL
-    assert [some.name for some in relaxation.gives_way] == ["contact_reach", "com_kinematics"]
-    reach = relaxation.gives_way[0]
-    assert (reach.knot, reach.violated) == (10, 8)
-    assert reach.amount == pytest.approx((0.70 - LEGS) / LEGS, rel=0.05)
+    (end,) = relaxation.gives_way
+    assert (end.name, end.component, end.knot, end.violated) == ("end: CoM", "z", 10, 1)
+    assert end.amount == pytest.approx(0.70 - LEGS, rel=0.05)
+    assert relaxation.price == pytest.approx(end.scaled, rel=1e-3)
+
+
+def test_a_reach_that_the_start_is_beyond_is_accused_and_no_integration(ironcub, stand):
+    short = replace(ironcub, contact_reach=np.array([0.3, 0.3, 0.56]))
+    reached = mt.build(short, replace(stand, final_com=(0.0, 0.0, 0.5)))
+    (found,) = mt.relax(reached).gives_way
+    assert (found.name, found.knot, found.amount) == ("contact_reach", 1, pytest.approx(0.57 / 0.56 - 1, abs=1e-3))
+    (error,) = [one for one in mt.doctor(short, reached.scenario).findings if one.name == "reach"]
+    assert error.severity.value == "error"
+    assert "from knot 1 on, when a robot that starts at rest has not moved yet" in error.found
 
 
 def test_only_the_terms_that_may_give_way_do_and_the_others_hold(too_high, solution):
@@ -97,7 +107,8 @@ def test_the_derivatives_of_the_relaxed_problem_are_those_of_its_functions(too_h
     random = np.random.default_rng(0)
     chosen = np.sort(random.choice(too_high.row_lower.size, 50, replace=False))
     start = too_high.guess
-    elastic = replace(room._Elastic.of(too_high, tuple(too_high.rows)), chosen=chosen)
+    whole = room._Elastic.of(too_high, tuple(too_high.rows))
+    elastic = replace(whole, chosen=chosen, weights=np.linspace(1.0, 3.0, 50))
     nlp, functions = room._relaxed(too_high, elastic, start)
     rows_at = cs.Function("rows", [nlp["x"]], [nlp["g"]])
     objective = cs.Function("objective", [nlp["x"]], [nlp["f"]])

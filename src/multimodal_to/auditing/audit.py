@@ -102,6 +102,7 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
     refuse_other_robot(trajectory, robot)
     robot = under_conditions(robot, trajectory)
     scenario = scenario or stored(trajectory)
+    scenario = None if scenario is None else scenario.for_robot(robot)
     phases = flight_phases(robot, trajectory)
     motion = Motion.of(robot, trajectory)
     worst = _of_postures(motion, scenario) if kinematic else _of_all(motion, scenario)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from multimodal_to.arguments import checked
+from multimodal_to.auditing import keyframes
 from multimodal_to.auditing.margins import MARGINS
 from multimodal_to.auditing.property import Judged, Of, Property
 from multimodal_to.auditing.self_collision import SELF_COLLISION
@@ -292,7 +293,7 @@ def _com(when: str) -> Property:
         limit=1e-5,
         reason=_FEASIBLE,
         meaning=f"distance of the CoM from `{'initial' if when == 'start' else 'final'}_com`, by axis",
-        judged=Judged.WITH_SCENARIO,
+        judged=Judged.WITH_SCENARIO if when == "start" else Judged.WITH_END_COM,
     )
 
 
@@ -444,6 +445,10 @@ _TASK = (
         meaning="how far the CoM at mid-horizon is below `mid_height_min`",
         judged=Judged.WITH_MID_HEIGHT,
     ),
+    *keyframes.PROPERTIES,
+    *_rest(keyframes.NAME, Judged.WITH_KEYFRAMES),
+    _standing(keyframes.NAME, Judged.WITH_KEYFRAMES),
+    *_hovering(keyframes.NAME, Judged.WITH_KEYFRAMES),
     _com("end"),
     *_rest("end", Judged.END_AT_REST),
     _standing("end", Judged.STANDING_END),
@@ -463,7 +468,9 @@ PROPERTIES: Mapping[str, Property] = FrozenMapping(
 @checked
 def judged(scenario: Scenario | None, robot: Robot) -> list[str]:
     """Return the names of the properties that a motion of a robot is judged by, in the order of the table."""
-    return [name for name, entry in PROPERTIES.items() if entry.judged.applies(scenario, robot)]
+    known = {name: entry.judged for name, entry in PROPERTIES.items() if entry.judged.applies(scenario, robot)}
+    asked = keyframes.kinds(scenario) if scenario else set()
+    return [name for name, condition in known.items() if condition is not Judged.WITH_KEYFRAMES or name in asked]
 
 
 @checked

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.auditing import keyframes
 from multimodal_to.auditing.findings import Motion, Worst, worst_of
 from multimodal_to.models.attitude import tilt
+from multimodal_to.scenarios.keyframes import attitude_at
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 from multimodal_to.trajectory.derived import at_knots, surface_frames, without_acceleration
 
@@ -15,31 +19,51 @@ _SPEEDS = ("com_velocity", "base_linear_velocity", "base_angular_velocity", "joi
 
 def task_findings(motion: Motion, scenario: Scenario) -> list[Worst]:
     """Check a motion against its scenario."""
-    return [*_start(motion, scenario), *_between(motion, scenario), *_end(motion, scenario)]
+    return [
+        *_start(motion, scenario),
+        *_between(motion, scenario),
+        *_keyframes(motion, scenario),
+        *_end(motion, scenario),
+    ]
+
+
+def _keyframes(motion: Motion, scenario: Scenario) -> list[Worst]:
+    """Return the worst miss of each kind that keyframes ask for, in the order of the table of properties."""
+    name = keyframes.NAME
+    still = [
+        replace(finding, body=f"{one.label} {finding.body}".rstrip())
+        for one in keyframes.asked(scenario)
+        for finding in (
+            *(_rest(name, motion, one.knot) if one.keyframe.still else ()),
+            *(_standing(name, motion, one.knot, scenario) if one.keyframe.standing else ()),
+            *(_hover(name, motion, one.knot, scenario) if one.keyframe.hover else ()),
+        )
+    ]
+    return keyframes.worst_by_kind([*keyframes.misses(motion, scenario), *still])
 
 
 def _start(motion: Motion, scenario: Scenario) -> list[Worst]:
-    findings = [_com("start: CoM", motion, 0, scenario.initial_com)]
+    findings = [_com("start: CoM", motion, 0, scenario.start_com)]
     if scenario.start is Start.GIVEN:  # it may move, and nothing has to carry it
         return findings
     findings += _rest("start", motion, 0)
     if scenario.start is Start.STANDING:
         findings += [*_standing("start", motion, 0, scenario), _no_thrust(motion)]
     if scenario.start is Start.HOVER:
-        findings += _hover("start", motion, 0)
+        findings += _hover("start", motion, 0, scenario)
     return [*findings, *_equilibrium("start", motion, 0)]
 
 
 def _end(motion: Motion, scenario: Scenario) -> list[Worst]:
     last = motion.trajectory.knots
-    findings = [_com("end: CoM", motion, last, scenario.final_com)]
+    findings = [] if scenario.final_com is None else [_com("end: CoM", motion, last, scenario.end_com)]
     if scenario.terminal in (Terminal.HOVER, Terminal.STANDING):
         findings += _rest("end", motion, last)
     if scenario.terminal is Terminal.STANDING:
         findings += _standing("end", motion, last, scenario)
     if scenario.terminal is Terminal.HOVER:
         known = last + without_acceleration(motion.trajectory)  # the last knot, or the one before it
-        findings += [*_hover("end", motion, last), *_equilibrium("end", motion, known)]
+        findings += [*_hover("end", motion, last, scenario), *_equilibrium("end", motion, known)]
     return findings
 
 
@@ -105,16 +129,18 @@ def _standing(when: str, motion: Motion, knot: int, scenario: Scenario) -> list[
     return [worst_of(f"{when}: feet off the ground", np.abs(heights)[:, None], motion.robot.contact_names, knot)]
 
 
-def _hover(when: str, motion: Motion, knot: int) -> list[Worst]:
+def _hover(when: str, motion: Motion, knot: int, scenario: Scenario) -> list[Worst]:
     """No contact force, an upright base, and thrusts that carry the weight and hold still.
 
     Args:
         when: "start" or "end", with which the properties' names begin.
         motion: that is judged.
         knot: at which.
+        scenario: whose keyframes may ask for another attitude than upright.
     """
     trajectory, weight = motion.trajectory, motion.robot.mass * motion.robot.gravity
-    upright = motion.robot.upright.base_transform[:3, :3]
+    asked = attitude_at(motion.robot, scenario.placed(), knot)
+    upright = replace(motion.robot.upright, base_quaternion_xyzw=asked).base_transform[:3, :3]
     off = tilt(motion.base[knot, :3, :3], upright, motion.robot.up)
     return [
         _at(f"{when}: contact force", knot, np.abs(trajectory.contact_forces[:, knot])),

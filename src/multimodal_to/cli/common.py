@@ -38,6 +38,8 @@ app = typer.Typer(
 )
 out = Console(highlight=False, markup=False, emoji=False)
 
+DEFAULT_ROBOT = "ironcub"
+"""The robot of the bundled scenarios, and of a task that names none."""
 _Value = TypeVar("_Value", int, float)
 
 File = Annotated[Path, typer.Argument(help="Trajectory file, as `solve` writes it.")]
@@ -76,6 +78,21 @@ def chosen(name: str, settings: list[str] | None, *, paper: bool = False) -> Sce
     else:
         scenario = as_in_paper(name) if paper else find(name)
     return change(scenario, settings or ())
+
+
+def robot_for(scenario: Scenario, option: str, *, file: str = "") -> str:
+    """Return the robot of a task: that of the option, else the one that the scenario names, else the iRonCub.
+
+    Args:
+        scenario: the task.
+        option: what `--robot` says; empty where it is not given.
+        file: of the task; where there is one and nothing names a robot, which one is taken is said.
+    """
+    if option or scenario.robot:
+        return option or scenario.robot or ""
+    if file.endswith(".toml"):
+        say("note", "cyan", f"'{file}' names no robot: it is planned for the {DEFAULT_ROBOT}; say robot = or --robot")
+    return DEFAULT_ROBOT
 
 
 def loaded(file: Path, robot: str) -> tuple[Robot, Trajectory]:

@@ -15,6 +15,7 @@ from rich.table import Column, Table
 from multimodal_to.auditing import Audit, audit, check_allowances
 from multimodal_to.cli import completion
 from multimodal_to.cli.common import (
+    DEFAULT_ROBOT,
     OptionalName,
     RobotOption,
     ScenarioName,
@@ -25,6 +26,7 @@ from multimodal_to.cli.common import (
     loaded,
     number_option,
     out,
+    robot_for,
     say,
     whole_number_option,
     writable,
@@ -38,16 +40,17 @@ from multimodal_to.doctor import doctor as examine
 from multimodal_to.errors import InputError, ScenarioError, apart
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.native import missing
-from multimodal_to.ocp import Formulation, build
+from multimodal_to.ocp import Formulation, Problem, build
 from multimodal_to.ocp.integration import LEAPFROG
 from multimodal_to.scenarios import SCENARIOS, find
 from multimodal_to.scenarios import paper as as_in_paper
 from multimodal_to.scenarios.data import stored, to_dict
 from multimodal_to.scenarios.files import change, to_toml
-from multimodal_to.scenarios.scenario import Scenario
-from multimodal_to.solving import Ipopt, Relaxation, Solution, Status, relax
+from multimodal_to.scenarios.scenario import Scenario, word
+from multimodal_to.solving import Ipopt, Solution, Status, relax
 from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
+from multimodal_to.solving.relaxation import GIVES_WAY, PHYSICS
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.derived import largest_torques
@@ -70,11 +73,11 @@ def list_scenarios() -> None:
 
 def _numbers(scenario: Scenario) -> str:
     durations = dict.fromkeys(f"{scenario.knots * dt:g}" for dt in (scenario.interval_min, scenario.interval_max))
-    start, end = (" ".join(f"{number:g}" for number in com) for com in (scenario.initial_com, scenario.final_com))
+    start, end = (" ".join(f"{number:g}" for number in com) for com in (scenario.start_com, scenario.end_com))
     middle = "" if scenario.mid_height_min is None else f"above {scenario.mid_height_min:g} m at mid-horizon, "
     return (
-        f"{scenario.knots} knots, {' to '.join(durations)} s, CoM from {start} m ({scenario.start.value}) to {end} m "
-        f"({scenario.terminal.value}), {middle}jets {'on' if scenario.jets else 'off'}, "
+        f"{scenario.knots} knots, {' to '.join(durations)} s, CoM from {start} m ({word(scenario.start)}) to {end} m "
+        f"({word(scenario.terminal)}), {middle}jets {'on' if scenario.jets else 'off'}, "
         f"ground: {to_dict(scenario)['surface']['kind']}"
     )
 
@@ -133,7 +136,7 @@ def _show_torques(file: Path, robot: str) -> None:
 def doctor(
     name: ScenarioName,
     settings: Settings = None,
-    robot: RobotOption = "ironcub",
+    robot: RobotOption = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON, for programs.")] = False,
 ) -> None:
     """Say in about a second whether a task can work at all, and what to change where it cannot.
@@ -142,13 +145,15 @@ def doctor(
 
     Example: multimodal-to doctor take-off --set knots=20
     """
-    the_robot = load_robot(robot)
     if not name.endswith(".toml"):
         find(name)  # a name that does not exist is no task
     try:
-        diagnosis = examine(the_robot, chosen(name, settings))
+        scenario = chosen(name, settings)
     except ScenarioError as error:  # there is no scenario to look at
-        diagnosis = refusal("scenario", error)
+        the_robot, diagnosis = load_robot(robot or DEFAULT_ROBOT), refusal("scenario", error)
+    else:
+        the_robot = load_robot(robot_for(scenario, robot, file=name))
+        diagnosis = examine(the_robot, scenario)
     if as_json:
         findings = [asdict(finding) | {"severity": finding.severity.value} for finding in diagnosis.findings]
         data = {"task": name, "robot": the_robot.name, "hopeless": diagnosis.hopeless, "findings": findings}
@@ -184,7 +189,7 @@ def solve(
         str,
         typer.Option(
             "--robot",
-            help="Bundled robot by name, or a robot's folder. [ironcub, or the file's]",
+            help="Bundled robot by name, or a robot's folder. [the task's, or ironcub]",
             autocompletion=completion.robots_or_folders,
         ),
     ] = "",
@@ -221,7 +226,7 @@ def solve(
 
     Example: multimodal-to solve --resume results/take-off/checkpoint.npz
     """
-    task = given(name, settings, robot, paper=paper, warm_start=warm_start, resume=resume)
+    task = given(name, settings, robot, paper=paper, warm_start=warm_start, resume=resume, quiet=quiet)
     scenario = task.scenario
     solver = Ipopt(max_iterations=max_iterations, time_limit=time_limit, linear_solver=linear_solver)
     chosen_solver = choose(linear_solver)  # before anything takes time
@@ -229,11 +234,12 @@ def solve(
     the_robot = load_robot(task.robot)
     if resume is not None and task.start is not None:
         the_robot = under_conditions(the_robot, task.start)
-    diagnosis = examine(the_robot, scenario, task.formulation)
+    diagnosis = examine(the_robot, scenario, task.formulation, initial=task.initial)
     _refuse_hopeless(diagnosis, console, force)
     folder = writable(output or (Path("results") / scenario.name if resume is None else resume.parent))
     started = time.perf_counter()
-    problem = build(the_robot, scenario, task.formulation)
+    problem = build(the_robot, scenario, task.formulation, initial=task.initial)
+    scenario = problem.scenario  # with numbers for all that is said from home or from a state
     the_robot = problem.robot  # with the jets that the scenario uses
     check_allowances(the_robot, scenario)  # so that a wrong name ends before the solve
     console.print(
@@ -258,7 +264,7 @@ def solve(
     _summarise(console, solution, report)
     _repeat(console, solution, diagnosis)
     if explain and not solution.status.solved and not progress.interrupted:
-        _explain(console, relax(problem, solution.trajectory, solver))
+        written += _explain(console, problem, solution, solver, folder)
     if not (no_pictures or progress.interrupted):  # who stops a solve does not want to wait for pictures
         written += _draw(the_robot, solution.trajectory, folder)
     for path in written:
@@ -269,20 +275,39 @@ def solve(
 
 def _repeat(console: Console, solution: Solution, diagnosis: Diagnosis) -> None:
     """Say again what the doctor said, where there is no answer."""
-    if solution.status in (Status.INFEASIBLE, Status.FAILED):
+    if not solution.status.solved and solution.status is not Status.STOPPED:
         for finding in diagnosis.of(Severity.ERROR) + diagnosis.of(Severity.WARNING):
             console.print(f"the doctor said: {finding}", soft_wrap=True)
 
 
-def _explain(console: Console, relaxation: Relaxation) -> None:
-    """Say what has to give way, or that nothing has to."""
-    spent = f"{relaxation.iterations} iterations in {relaxation.solve_time:.1f} s"
-    if not relaxation.status.solved:
-        console.print(f"explain: found nothing for certain in {spent}: {relaxation.status.value}", soft_wrap=True)
-    elif not relaxation.gives_way:
-        console.print(f"explain: nothing has to give way, all rows can be met together ({spent})", soft_wrap=True)
-    for some in relaxation.gives_way:
+def _explain(console: Console, problem: Problem, solution: Solution, solver: Ipopt, folder: Path) -> list[Path]:
+    """Say what has to give way, or that nothing has to; then keep the motion that shows it, and return its path.
+
+    Args:
+        console: that it is said on.
+        problem: without an answer.
+        solution: where its solve ended.
+        solver: whose limits hold.
+        folder: of the results.
+    """
+    found = relax(problem, solution.trajectory, solver)
+    if not found.status.solved or found.price >= PHYSICS * GIVES_WAY:  # where the solve ended may be a bad place
+        again = relax(problem, solver=solver)
+        found = min(found, again, key=lambda one: (not one.status.solved, one.price))
+    spent = f"{found.iterations} iterations in {found.solve_time:.1f} s"
+    if not found.status.solved:
+        console.print(f"explain: found nothing for certain in {spent}: {found.status.value}", soft_wrap=True)
+    for some in found.gives_way:
         console.print(f"explain: gives way: {some}", soft_wrap=True)
+    if found.gives_way or not found.status.solved:
+        return []
+    path = found.trajectory.save(folder / "explained.npz")
+    console.print(
+        f"explain: nothing has to give way, all rows can be met together ({spent}): the task is feasible, and the "
+        f"start guess led the solver astray; --warm-start {path} starts from a motion that meets them",
+        soft_wrap=True,
+    )
+    return [path]
 
 
 def _draw(robot: Robot, trajectory: Trajectory, folder: Path) -> list[Path]:
@@ -341,7 +366,7 @@ def reproduce_scenarios(
     asked = names or SCENARIOS
     tasks = [(find(name), Formulation.executable(), writable(output / name)) for name in asked]
     tasks += [(as_in_paper(name), Formulation.paper(), writable(output / f"{name}-paper")) for name in asked]
-    robot = load_robot("ironcub")
+    robot = load_robot(DEFAULT_ROBOT)
 
     from multimodal_to.files.writing import write_text
     from multimodal_to.reporting.comparison import AUDITS, SOLVES, markdown, table

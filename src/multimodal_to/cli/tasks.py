@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
 
-from multimodal_to.cli.common import chosen
+from multimodal_to.cli.common import chosen, robot_for
 from multimodal_to.errors import InputError, ScenarioError
+from multimodal_to.models.robot import load_robot
+from multimodal_to.models.state import State
 from multimodal_to.ocp import Formulation
 from multimodal_to.scenarios.data import stored
 from multimodal_to.scenarios.files import change
-from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.scenarios.scenario import Scenario, Start
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.rules import BACKWARD_EULER
+from multimodal_to.trajectory.states import state_at
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,6 +28,7 @@ class Task:
     robot: str
     formulation: Formulation
     start: Trajectory | None
+    initial: State | None = None  # that an unfinished solve with a given start starts in
 
 
 def given(
@@ -35,16 +39,18 @@ def given(
     paper: bool,
     warm_start: Path | None,
     resume: Path | None,
+    quiet: bool = False,
 ) -> Task:
     """Return the task that the options of `solve` ask for.
 
     Args:
         name: of a bundled scenario, or its TOML file.
         settings: changes as `KEY=VALUE`.
-        robot: name or folder; empty for the file's own, or the iRonCub.
+        robot: name or folder; empty for the scenario's, the file's own, or the iRonCub.
         paper: whether it is the paper's own formulation.
         warm_start: trajectory file of a similar task.
         resume: checkpoint or trajectory file of an unfinished solve.
+        quiet: whether nothing is said of which robot is taken.
 
     Raises:
         InputError: they contradict each other, or none of them is a task.
@@ -55,9 +61,9 @@ def given(
             raise InputError("nothing to solve; expected the NAME of a scenario, or --resume FILE")
         start = None if warm_start is None else Trajectory.load(warm_start)
         formulation = Formulation.paper() if paper else Formulation.executable()
-        return Task(
-            scenario=chosen(name, settings, paper=paper), robot=robot or "ironcub", formulation=formulation, start=start
-        )
+        asked = chosen(name, settings, paper=paper)
+        whose = robot_for(asked, robot, file="" if quiet else name)
+        return Task(scenario=asked, robot=whose, formulation=formulation, start=start)
     if warm_start is not None:
         raise InputError("--resume and --warm-start both say what to start from; expected one of them")
     start = Trajectory.load(resume)
@@ -77,13 +83,18 @@ def given(
     asked = (
         change(scenario, settings or ()) if name is None else chosen(name, settings, paper=start.rule == BACKWARD_EULER)
     )
-    if asked != scenario:
+    whose = robot or ("" if name is None else asked.robot) or start.robot  # no path that the file alone names
+    asked = replace(asked.for_robot(load_robot(whose)), robot=None)
+    initial = state_at(start, 0.0) if scenario.start is Start.GIVEN else None
+    if initial is not None and asked.start is Start.GIVEN:
+        asked = replace(asked, initial_state=None, initial_knot=None, initial_com=scenario.initial_com)
+    if asked != replace(scenario, robot=None):
         raise InputError(
             f"'{resume}' is of '{scenario.name}' with other values than asked for; --resume goes on with its own, "
             "--warm-start starts a changed task from it"
         )
     formulation = Formulation.of_rule(start.rule)
-    return Task(scenario=scenario, robot=robot or start.robot, formulation=formulation, start=start)
+    return Task(scenario=scenario, robot=whose, formulation=formulation, start=start, initial=initial)
 
 
 def free_checkpoint(folder: Path, resume: Path | None, console: Console) -> Path:

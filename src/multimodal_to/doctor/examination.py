@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from multimodal_to.arguments import checked
+from multimodal_to.doctor import keyframes
 from multimodal_to.doctor.diagnosis import Diagnosis, Symptom, error
 from multimodal_to.doctor.formulation import formulation
 from multimodal_to.doctor.ground import height, hold
@@ -14,8 +15,9 @@ from multimodal_to.doctor.task import Task
 from multimodal_to.doctor.thrust import spool_up_time, weight
 from multimodal_to.doctor.travel import leap, push, speed
 from multimodal_to.doctor.weighing import allowances, costs, groups, scales
-from multimodal_to.errors import MultimodalError
+from multimodal_to.errors import InputError, MultimodalError, ScenarioError, TrajectoryError
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.state import State
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.scenarios.scenario import Scenario
 
@@ -35,6 +37,11 @@ CHECKS: tuple[Check, ...] = (
     hold,
     reach,
     trim,
+    keyframes.joints,
+    keyframes.turns,
+    keyframes.stands,
+    keyframes.frames,
+    keyframes.yaw_without_moment,
 )
 """What is asked of every task."""
 ONCE_SOUND: tuple[Check, ...] = (formulation,)
@@ -42,7 +49,9 @@ ONCE_SOUND: tuple[Check, ...] = (formulation,)
 
 
 @checked
-def doctor(robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> Diagnosis:
+def doctor(
+    robot: Robot, scenario: Scenario, formulation: Formulation | None = None, *, initial: State | None = None
+) -> Diagnosis:
     """Return what can be said of a task before its problem is built and solved, in about a second.
 
     An error is certain, or as certain as what `build` refuses: no motion does what is asked. Nothing is raised for a
@@ -52,8 +61,14 @@ def doctor(robot: Robot, scenario: Scenario, formulation: Formulation | None = N
         robot: whose motion it is.
         scenario: the task.
         formulation: what the problem is made of; by default `Formulation.executable()`.
+        initial: the state that a motion with a given start starts in; by default that of the scenario's file.
     """
-    task = Task.of(robot, scenario, formulation)
+    try:
+        task = Task.of(robot, scenario, formulation, initial)
+    except ScenarioError as cause:
+        return refusal("keyframes", cause, "name what the robot has, and ask for one thing at a knot")
+    except (TrajectoryError, InputError) as cause:
+        return refusal("initial_state", cause, "name a trajectory file of this robot")
     if not robot.contacts:
         return refusal("contacts", f"{robot.name} has no contact points to stand on", "name some in its robot.toml")
     findings = [finding for check in CHECKS for finding in check(task)]

@@ -22,7 +22,7 @@ _INTEGRATION = "_integration"  # what the names of rows end with that tie a vari
 def formulation(task: Task) -> Iterator[Symptom]:
     """Look for bounds that contradict each other and for variables that nothing asks for."""
     try:
-        outline = formulate(task.robot, task.scenario, task.posture, task.formulation)
+        outline = formulate(task.robot, task.scenario, task.posture, task.formulation, task.initial)
     except FormulationError as cause:
         yield error("terms", str(cause), "change the term, or leave it out")
         return

@@ -27,20 +27,20 @@ def height(task: Task) -> Iterator[Symptom]:
     """Look for the postures in which the robot has to stand, and say which height its legs reach instead."""
     scenario = task.scenario
     if task.stands_at_start and task.start_posture is None:
-        yield error("standing start", _no_posture(task, scenario.initial_com), _other_height(task, "initial"))
-        if scenario.initial_com[2] == scenario.final_com[2]:
+        yield error("standing start", _no_posture(task, scenario.start_com), _other_height(task, "initial"))
+        if scenario.start_com[2] == scenario.end_com[2]:
             return  # the same once more
     if not task.stands_at_end:
         return
     if task.end_posture is None:
         # Elsewhere the ground is another, and the feet may find a place that one search has not; `build` needs the
         # posture where there is no other.
-        certain = task.on_plane or not task.stands_at_start
+        certain = (task.on_plane or not task.stands_at_start) and task.scenario.final_com is not None
         yield (error if certain else warning)(
-            "standing end", _no_posture(task, scenario.final_com), _other_height(task, "final")
+            "standing end", _no_posture(task, scenario.end_com), _other_height(task, "final")
         )
     elif isinstance(scenario.surface, FlatGround):
-        above = scenario.final_com[2] - scenario.surface.height
+        above = scenario.end_com[2] - scenario.surface.height
         reach = task.robot.contact_reach[2]
         if task.held(paper.CONTACT_REACH) and above > reach:
             yield error(
@@ -59,7 +59,7 @@ def _no_posture(task: Task, com: Vector3) -> str:
 
 
 def _other_height(task: Task, which: str) -> str:
-    com: Vector3 = getattr(task.scenario, f"{which}_com")
+    com = task.scenario.start_com if which == "initial" else task.scenario.end_com
     reached = _nearest_height(task, com)
     if reached is None:
         return f"choose another {which}_com_height"

@@ -38,18 +38,29 @@ def _upright(task: Task) -> bool:
 
 def _beyond(task: Task, term: Constraint, names: tuple[str, ...], limits: Array, key: str) -> Iterator[Symptom]:
     robot = task.robot
-    knot = knot_of(task, task.posture, cs.SX.zeros(3 * len(robot.contacts)), cs.SX.zeros(len(robot.jets)))
-
+    forces, thrusts = cs.SX.zeros(3 * len(robot.contacts)), cs.SX.zeros(len(robot.jets))
+    knot = knot_of(task, task.posture, forces, thrusts)
     arms = np.abs(np.array(cs.evalf(term.rows(knot, task.parameters).expression))).reshape(-1, 3)
     if arms.max(initial=0.0) <= 1 + _TOLERANCE:
         return
     point, axis = np.unravel_index(int(arms.argmax()), arms.shape)
     # A robot without moving joints that has to be upright somewhere can bring nothing nearer there.
     certain = task.rigid and bool(task.hovers) and _upright(task)
-    away = apart(arms[point, axis] * limits[axis], limits[axis])
+    length = float(arms[point, axis] * limits[axis])
+    away = apart(length, limits[axis])
+    found = (
+        f"{names[point]} is {away} m from the CoM along {'xyz'[axis]} in the posture that the problem is built around, "
+        f"and the problem allows {limits[axis]:g} m"
+    )
+    if (
+        term == paper.CONTACT_REACH
+        and task.stands_at_start
+        and task.rests_first
+        and axis == 2
+        and arms[:, 2].min() > 1 + _TOLERANCE
+    ):
+        certain = True  # feet that carry the robot are still where they were, and so is its CoM
+        found += " from knot 1 on, when a robot that starts at rest has not moved yet"
     yield (error if certain else warning)(
-        "reach",
-        f"{names[point]} is {away} m from the CoM along {'xyz'[axis]} in the posture "
-        f"that the problem is built around, and the problem allows {limits[axis]:g} m",
-        f"bring it nearer, or widen '{key}' in the [reach] of the robot's robot.toml",
+        "reach", found, f"bring it nearer, or widen '{key}' in the [reach] of the robot's robot.toml"
     )

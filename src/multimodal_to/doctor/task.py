@@ -11,12 +11,16 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.doctor.turbines import greatest_held
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Posture, Robot
+from multimodal_to.models.state import State
 from multimodal_to.models.terrain import FlatGround, Plane
+from multimodal_to.ocp import given, paper, rebinding
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.guess import standing_posture
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import Constraint
+from multimodal_to.ocp.waypoints import com as com_path
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
+from multimodal_to.trajectory import rules
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,18 +30,37 @@ class Task:
     robot: Robot
     scenario: Scenario
     formulation: Formulation
+    initial: State | None = None  # that a motion with a given start starts in
 
     @classmethod
-    def of(cls, robot: Robot, scenario: Scenario, formulation: Formulation | None = None) -> Task:
+    def of(
+        cls,
+        robot: Robot,
+        scenario: Scenario,
+        formulation: Formulation | None = None,
+        initial: State | None = None,
+    ) -> Task:
         """Return a scenario for a robot, whose jets are left out if the scenario leaves them off.
 
         Args:
             robot: whose motion it is.
             scenario: the task.
             formulation: what the problem is made of; by default `Formulation.executable()`.
+            initial: the state that a motion with a given start starts in; by default that of the scenario's file.
+
+        Raises:
+            ScenarioError: a keyframe names a joint or a frame that the robot lacks, or contradicts another.
+            TrajectoryError: the file of the state that it starts in is missing or broken.
+            InputError: that state is of another robot.
         """
+        scenario = scenario.for_robot(robot)
         robot = robot if scenario.jets else robot.with_jets(())
-        return cls(robot=robot, scenario=scenario, formulation=formulation or Formulation.executable())
+        initial = initial or given.measured(scenario)
+        if initial is not None:
+            initial.refuse_other_robot(robot)
+            scenario = rebinding.started(robot, scenario, initial)
+        made_of = formulation or Formulation.executable()
+        return cls(robot=robot, scenario=scenario, formulation=made_of, initial=initial)
 
     # ---------------------------------------------------------------- time
 
@@ -51,17 +74,33 @@ class Task:
         """Return over how many intervals the CoM can move: one that ends at rest stands still over the last two."""
         return self.scenario.knots - (0 if self.scenario.terminal is Terminal.FREE else 2)
 
+    @property
+    def rests_first(self) -> bool:
+        """Return whether the CoM stands still over the first interval: from rest and equilibrium, by leapfrog."""
+        by_rest = self.scenario.start is not Start.GIVEN and bool(self.held(paper.STATIC_EQUILIBRIUM))
+        return by_rest and bool(rules.instant(self.formulation.rule.name, "com_velocity"))
+
     # ---------------------------------------------------------------- in the air
 
     @cached_property
     def hovers(self) -> dict[str, Vector3]:
-        """Return where the CoM has to hover [m], by when."""
+        """Return where the CoM has to hover [m], by when; about where, if a keyframe does not say all of it."""
         scenario, where = self.scenario, dict[str, Vector3]()
         if scenario.start is Start.HOVER:
-            where["start"] = scenario.initial_com
+            where["start"] = scenario.start_com
+        for one in scenario.keyframes_between():
+            if one.keyframe.hover:
+                x, y, z = (float(value) for value in com_path(scenario)[:, one.knot])
+                where[one.label] = x, y, z
         if scenario.terminal is Terminal.HOVER:
-            where["end"] = scenario.final_com
+            where["end"] = scenario.end_com
         return where
+
+    @property
+    def first_hover(self) -> int | None:
+        """Return the first knot after the start that hovers, if there is one."""
+        knots = [one.knot for one in self.scenario.placed() if one.knot and one.keyframe.hover]
+        return min(knots, default=None)
 
     @cached_property
     def thrusts_held(self) -> Array:
@@ -93,12 +132,12 @@ class Task:
     @cached_property
     def start_posture(self) -> Posture | None:
         """Return the posture in which the motion starts on its feet, if it does and there is one."""
-        return self._standing(self.scenario.initial_com) if self.stands_at_start else None
+        return self._standing(self.scenario.start_com) if self.stands_at_start else None
 
     @cached_property
     def end_posture(self) -> Posture | None:
         """Return a posture in which the motion can end on its feet, if it has to and one is found."""
-        return self._standing(self.scenario.final_com) if self.stands_at_end else None
+        return self._standing(self.scenario.end_com) if self.stands_at_end else None
 
     @property
     def posture(self) -> Posture:

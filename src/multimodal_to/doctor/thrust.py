@@ -39,27 +39,27 @@ def weight(task: Task) -> Iterator[Symptom]:
 
 def spool_up_time(task: Task) -> Iterator[Symptom]:
     """Compare the time that idle jets need to carry the weight with the horizon's longest duration."""
-    robot, scenario = task.robot, task.scenario
-    if not (task.stands_at_start and "end" in task.hovers and task.lifts):
+    robot, scenario, knots = task.robot, task.scenario, task.first_hover
+    if not (task.stands_at_start and knots and task.lifts):
         return
-    step = scenario.interval_max
+    step, longest = scenario.interval_max, knots * scenario.interval_max
     count = max(scenario.knots, int(_PATIENCE / step))
     times = np.linspace(step, count * step, count)
     enough = np.flatnonzero(spool_up(robot.jets, times).sum(axis=0) >= robot.weight)
     needed = times[enough[0]] if enough.size else np.inf
     reached = f"the jets need {needed:.1f} s" if enough.size else f"the jets need more than {times[-1]:.0f} s"
-    found = f"{reached} at full throttle from idle until they carry {robot.weight:.0f} N, and the horizon is"
-    have = f"{scenario.knots} intervals of up to {step:g} s"
-    if needed > task.longest + 1e-9:
+    horizon = "the horizon" if knots == scenario.knots else f"the time until the hover at knot {knots}"
+    found = f"{reached} at full throttle from idle until they carry {robot.weight:.0f} N, and {horizon} is"
+    have = f"{knots} intervals of up to {step:g} s"
+    if needed > longest + 1e-9:
         least = f"knots = {int(np.ceil(needed / step))} or " if enough.size else "more knots or "
-        yield error(
-            "spool-up", f"{found} at most {task.longest:.3g} s long ({have})", f"allow {least}a longer interval_max"
-        )
-    elif needed > _HURRY * task.longest:
+        least = least if knots == scenario.knots else "a later hover or "
+        yield error("spool-up", f"{found} at most {longest:.3g} s long ({have})", f"allow {least}a longer interval_max")
+    elif needed > _HURRY * longest:
         yield warning(
             "spool-up",
-            f"{found} at most {task.longest:.3g} s long ({have}), which leaves little",
+            f"{found} at most {longest:.3g} s long ({have}), which leaves little",
             "allow more knots or a longer interval_max",
         )
     else:
-        yield note("spool-up", f"{found} up to {task.longest:.3g} s long")
+        yield note("spool-up", f"{found} up to {longest:.3g} s long")

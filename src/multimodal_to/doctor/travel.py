@@ -11,8 +11,11 @@ from multimodal_to.doctor.diagnosis import Symptom, error, warning
 from multimodal_to.doctor.task import Task
 from multimodal_to.errors import apart
 from multimodal_to.models.terrain import FlatGround
+from multimodal_to.scenarios.keyframes import AXES
 from multimodal_to.scenarios.scenario import Terminal
 
+_FEWEST = 4
+"""Intervals below which a flight is followed badly [1]."""
 _LIMBS = 0.25
 """How far limbs may carry the CoM beside the base, whose speed alone is limited, as a share of the legs' reach [1]."""
 
@@ -24,7 +27,7 @@ def speed(task: Task) -> Iterator[Symptom]:
     def furthest(intervals: int) -> float:
         return intervals * scenario.interval_max * scenario.base_speed_max
 
-    start, end = np.array(scenario.initial_com), np.array(scenario.final_com)
+    start, end = np.array(scenario.start_com), np.array(scenario.end_com)
     stretches = [("from start to end", float(np.abs(end - start).max()), task.moving_intervals)]
     if scenario.mid_height_min is not None:
         middle = scenario.knots // 2
@@ -32,6 +35,7 @@ def speed(task: Task) -> Iterator[Symptom]:
             ("up to mid_height_min", scenario.mid_height_min - start[2], middle),
             ("down from mid_height_min", scenario.mid_height_min - end[2], task.moving_intervals - middle),
         ]
+    stretches += _between_keyframes(task)
     label, distance, intervals = max(stretches, key=lambda stretch: stretch[1] - furthest(stretch[2]))
     if distance <= furthest(intervals):
         return
@@ -45,6 +49,25 @@ def speed(task: Task) -> Iterator[Symptom]:
     )
 
 
+def _between_keyframes(task: Task) -> list[tuple[str, float, int]]:
+    """Return each stretch that the CoM has to go along an axis between two keyframes: label, way [m], intervals."""
+    stretches = []
+    for axis in AXES:
+        known: tuple[str, int, float, float] | None = None
+        for one in sorted(task.scenario.placed(), key=lambda some: some.knot):
+            asked = [limits[1:] for limits in one.keyframe.limits() if limits[0] == f"CoM {axis} [m]"]
+            if one.keyframe.weight is not None or not asked or one.label == "middle":
+                continue
+            low, high = max(least for least, _ in asked), min(most for _, most in asked)
+            if known is not None and one.knot > known[1] and {one.label, known[0]} != {"start", "end"}:
+                way, intervals = max(low - known[3], known[2] - high, 0.0), one.knot - known[1]
+                intervals -= known[0] == "start" and task.rests_first
+                intervals -= task.scenario.knots - task.moving_intervals if one.label == "end" else 0
+                stretches.append((f"along {axis} from {known[0]} to {one.label}", way, intervals))
+            known = one.label, one.knot, low, high
+    return stretches
+
+
 def push(task: Task) -> Iterator[Symptom]:
     """Compare the way along the ground with what friction alone can push and stop, from rest to rest without jets.
 
@@ -54,7 +77,7 @@ def push(task: Task) -> Iterator[Symptom]:
     scenario, robot = task.scenario, task.robot
     if robot.jets or not isinstance(scenario.surface, FlatGround) or not (task.stands_at_start and task.stands_at_end):
         return
-    way = np.abs(np.subtract(scenario.final_com, scenario.initial_com))[:2]
+    way = np.abs(np.subtract(scenario.end_com, scenario.start_com))[:2]
     moving, step, friction = task.moving_intervals, scenario.interval_max, task.parameters.friction
     gravity = robot.weight / robot.mass
     furthest = friction * gravity * (moving + 1) * moving * step**2 / 2
@@ -76,29 +99,64 @@ def leap(task: Task) -> Iterator[Symptom]:
     scenario, robot = task.scenario, task.robot
     if robot.jets or task.hovers or not isinstance(scenario.surface, FlatGround):
         return
-    heights = {"mid_height_min": scenario.mid_height_min}
-    if scenario.terminal is Terminal.FREE:
-        heights["the height of final_com"] = scenario.final_com[2]
-    gravity = robot.weight / robot.mass
-    for label, height in heights.items():
-        # A contact point keeps its share of the weight up to a height of complementarity_max over that share.
-        loose = scenario.contact_bounds(robot)[0] * len(robot.contacts) / robot.weight
-        rise = (height or 0.0) - scenario.surface.height - robot.contact_reach[2] - loose
-        if height is None or rise <= 0:
-            continue
-        lift_off, climb = math.sqrt(2 * gravity * rise), math.sqrt(2 * rise / gravity)
-        found = f"{label}, {height:g} m, is {rise:.3g} m above where feet on the ground let the CoM be; a jump there"
-        if task.stands_at_end and 2 * climb > task.longest:
-            yield error(
-                "leap",
-                f"{found} and back takes {2 * climb:.2g} s, and the horizon is at most {task.longest:.3g} s long",
-                "allow more knots or a longer interval_max",
-            )
-        elif lift_off > scenario.base_speed_max:
-            certain = rise - _LIMBS * robot.contact_reach[2] > scenario.base_speed_max * climb
-            yield (error if certain else warning)(
-                "leap",
-                f"{found} without jets lifts off at {lift_off:.2g} m/s, and base_speed_max is "
-                f"{scenario.base_speed_max:g} m/s",
-                "ask for less height, allow more base_speed_max, or turn the jets on",
-            )
+    # A contact point keeps its share of the weight up to a height of complementarity_max over that share.
+    loose = scenario.contact_bounds(robot)[0] * len(robot.contacts) / robot.weight
+    for label, height, knot in _heights(task):
+        rise = height - scenario.surface.height - robot.contact_reach[2] - loose
+        if rise > 0:
+            yield from _leap(task, label, rise, knot)
+
+
+def _heights(task: Task) -> Iterator[tuple[str, float, int]]:
+    """Return the heights that the CoM has to reach: what asks for it, z [m], and at which knot."""
+    scenario = task.scenario
+    if scenario.mid_height_min is not None:
+        yield f"mid_height_min, {scenario.mid_height_min:g} m,", scenario.mid_height_min, scenario.knots // 2
+    if scenario.terminal is Terminal.FREE and scenario.final_com is not None:
+        yield f"the height of final_com, {scenario.end_com[2]:g} m,", scenario.end_com[2], scenario.knots
+    for one in scenario.own_keyframes():
+        for what, least, _ in one.keyframe.limits() if one.keyframe.weight is None else ():
+            if what == "CoM z [m]" and math.isfinite(least):
+                yield f"the CoM of {one.label}, {least:g} m,", least, one.knot
+
+
+def _leap(task: Task, label: str, rise: float, knot: int) -> Iterator[Symptom]:
+    """Compare a jump with the time that there is, the speed that is allowed and the length of an interval.
+
+    Args:
+        task: robot and scenario.
+        label: what asks for it.
+        rise: how far above the legs' reach [m].
+        knot: at which.
+    """
+    scenario, gravity = task.scenario, task.robot.weight / task.robot.mass
+    lift_off, climb = math.sqrt(2 * gravity * rise), math.sqrt(2 * rise / gravity)
+    found = f"{label} is {rise:.3g} m above where feet on the ground let the CoM be; a jump there"
+    before, after = (count * scenario.interval_max for count in (knot, scenario.knots - knot))
+    if task.stands_at_end and 2 * climb > task.longest:
+        yield error(
+            "leap",
+            f"{found} and back takes {2 * climb:.2g} s, and the horizon is at most {task.longest:.3g} s long",
+            "allow more knots or a longer interval_max",
+        )
+    elif (task.stands_at_start and before < climb) or (task.stands_at_end and after < climb):
+        yield error(
+            "leap",
+            f"{found} takes {climb:.2g} s up and as long down, and knot {knot} is at most {before:.3g} s after the "
+            f"start and {after:.3g} s before the end",
+            "allow more knots or a longer interval_max, or ask for it at another knot",
+        )
+    elif lift_off > scenario.base_speed_max:
+        certain = rise - _LIMBS * task.robot.contact_reach[2] > scenario.base_speed_max * climb
+        yield (error if certain else warning)(
+            "leap",
+            f"{found} without jets lifts off at {lift_off:.2g} m/s, and base_speed_max is "
+            f"{scenario.base_speed_max:g} m/s",
+            "ask for less height, allow more base_speed_max, or turn the jets on",
+        )
+    elif 2 * climb < _FEWEST * scenario.interval_min:
+        yield warning(
+            "leap",
+            f"{found} and back takes {2 * climb:.2g} s, less than {_FEWEST} intervals of {scenario.interval_min:g} s",
+            "take shorter intervals: so few of them do not follow a flight",
+        )

@@ -30,7 +30,12 @@ def groups(task: Task) -> Iterator[Symptom]:
         try:
             task.robot.group_indices(group)
         except ModelError as cause:
-            yield error("weights", f"weights.joint_velocities: {cause}", "name a joint group of the robot's robot.toml")
+            yield error(
+                "weights",
+                f"weights.joint_velocities: {cause}",
+                "name a joint group of the robot's robot.toml; in a file with 'based_on', "
+                'replace = ["weights.joint_velocities"] leaves out those of the bundled scenario',
+            )
         else:
             members.update(task.robot.joint_groups[group])
     if twice := [name for name, count in members.items() if count > 1]:
@@ -106,7 +111,7 @@ def scales(task: Task) -> Iterator[Symptom]:
     known = {variable.name: variable.scale for variable in task.formulation.variables}
     expected = {
         "contact_forces": robot.weight / len(robot.contacts),
-        "com_position": float(np.abs([scenario.initial_com, scenario.final_com]).max()),
+        "com_position": float(np.abs([scenario.start_com, scenario.end_com]).max()),
     }
     if robot.jets and task.hovers:
         expected["thrust"] = robot.weight / len(robot.jets)

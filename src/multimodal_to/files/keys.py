@@ -16,7 +16,7 @@ from itertools import pairwise
 from typing import Any, get_args, get_origin, get_type_hints
 
 from multimodal_to.errors import InputError
-from multimodal_to.files.records import Unions, without_none
+from multimodal_to.files.records import Unions, members_of
 
 _UNIT = re.compile(r"\s*\[([^\]]*)\]")
 _COUNTS = {2: "two", 3: "three", 4: "four"}
@@ -60,10 +60,13 @@ def _keys(record: type, prefix: str, where: str, unions: Unions) -> Iterator[Key
             raise InputError(
                 f"the field '{entry.name}' of {record.__name__} has no text below it that says its meaning"
             )
-        name, kind = prefix + entry.name, without_none(hints[entry.name])
+        name = prefix + entry.name
+        types = members_of(hints[entry.name])
+        kind = types[0]
         unit = ", ".join(_UNIT.findall(texts[entry.name]))
         default, meaning = _default(entry, kind, unions), _UNIT.sub("", texts[entry.name]).rstrip(".")
-        yield Key(name=name, kind=_kind(kind, unions), unit=unit, default=default, meaning=meaning, where=where)
+        said = " or ".join(_kind(one, unions) for one in types)
+        yield Key(name=name, kind=said, unit=unit, default=default, meaning=meaning, where=where)
         if kind in unions:
             kinds = ", ".join(unions[kind])
             yield Key(name=f"{name}.kind", kind=f"one of {kinds}", unit="", default=default, meaning="Which one it is")

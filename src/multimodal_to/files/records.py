@@ -11,7 +11,7 @@ msgspec takes unknown keys of a dataclass for good, and its errors keep back the
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from enum import Enum
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
@@ -54,16 +54,25 @@ class Records:
         if isinstance(value, Enum):
             return value.value
         if is_dataclass(value):
-            kinds = {kind: name for union in self.unions.values() for name, kind in union.items()}
-            entries = {"kind": kinds.get(type(value))} | {
-                item.name: getattr(value, item.name) for item in fields(value)
-            }
-            return {name: self.plain(entry) for name, entry in entries.items() if entry is not None}
+            return self._plain_record(value, all_of_it=True)
         if isinstance(value, Mapping):
-            return {key: self.plain(entry) for key, entry in value.items()}
+            return {key: self._plain_entry(entry) for key, entry in value.items()}
         if isinstance(value, tuple):
-            return [self.plain(entry) for entry in value]
+            return [self._plain_entry(entry) for entry in value]
         return value
+
+    def _plain_record(self, value: Any, *, all_of_it: bool) -> dict[str, Any]:
+        kinds = {kind: name for union in self.unions.values() for name, kind in union.items()}
+        entries = {"kind": kinds.get(type(value))} | {
+            item.name: getattr(value, item.name)
+            for item in fields(value)
+            if all_of_it or getattr(value, item.name) != _default_of(item)
+        }
+        return {name: self.plain(entry) for name, entry in entries.items() if entry is not None}
+
+    def _plain_entry(self, value: Any) -> Any:
+        """Return a member of a list or of a table; a record there says only what differs from its defaults."""
+        return self._plain_record(value, all_of_it=False) if is_dataclass(value) else self.plain(value)
 
     def _record(self, kind: Any, table: Any, where: str, base: Any, also: Iterable[str] = ()) -> Any:
         if not isinstance(table, Mapping):
@@ -111,7 +120,10 @@ class Records:
             key: what errors call it.
             base: the value that a table changes, if any.
         """
-        kind = without_none(kind)
+        kinds = members_of(kind)
+        kind = next((some for some in kinds if _takes(some, value)), None) if len(kinds) > 1 else kinds[0]
+        if kind is None:
+            raise self._wrong(key, value, " or ".join(_WORDS[get_origin(some) or some] for some in kinds))
         if kind in self.unions:
             return self._one_of(self.unions[kind], value, key, base)
         if is_dataclass(kind):
@@ -158,8 +170,23 @@ class Records:
         return self.error(f"'{key}' is {shown(value)}; expected {expected}")
 
 
-def without_none(kind: Any) -> Any:
-    """Return the type of a field whose value may also be None."""
+def _default_of(entry: Field[Any]) -> Any:
+    return entry.default if entry.default_factory is MISSING else entry.default_factory()
+
+
+def members_of(kind: Any) -> tuple[Any, ...]:
+    """Return the types that a field's value may have, but for None."""
     if isinstance(kind, UnionType):
-        return next(member for member in get_args(kind) if member is not type(None))
-    return kind
+        return tuple(member for member in get_args(kind) if member is not type(None))
+    return (kind,)
+
+
+_WORDS = {tuple: "a list", Mapping: "a table", str: "a text", float: "a finite number"}
+"""What the members of a type with several are in a file."""
+
+
+def _takes(kind: Any, value: Any) -> bool:
+    """Return whether a value of a file is meant to be of one of a field's several types."""
+    form = get_origin(kind) or kind
+    given = {list: tuple, tuple: tuple, str: str, int: float, float: float}.get(type(value))
+    return form is given or (form is Mapping and isinstance(value, Mapping))

@@ -172,6 +172,18 @@ class Robot(Value):
         jets = _offsets(self.kindyn, self.home, [jet.frame for jet in self.jets])
         return proportions.standing_height(contacts, jets)
 
+    @cached_property
+    def home_com(self) -> tuple[float, float, float]:
+        """Return the CoM of home above the world's origin, with the lowest contact points at z = 0 [m], (x, y, z).
+
+        Without contact points it is the CoM of home as `robot.toml` places it.
+        """
+        contacts = _offsets(self.kindyn, self.home, self.contact_names)
+        if not len(contacts):
+            x, y, z = (float(one) for one in self.com_at(self.home))
+            return x, y, z
+        return 0.0, 0.0, -float(contacts[:, 2].min())
+
     @property
     def speed_unit(self) -> float:
         """Return √(|g| L) [m/s], the robot's own unit of speed."""

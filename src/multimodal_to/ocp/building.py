@@ -17,10 +17,9 @@ from multimodal_to.models.state import State
 from multimodal_to.ocp import given, rebinding
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.outline import formulate, prepared
-from multimodal_to.ocp.problem import BoundSet, Problem, RowSet
-from multimodal_to.ocp.stages import Held, NamedStage
+from multimodal_to.ocp.problem import Problem, RowSet
+from multimodal_to.ocp.stages import NamedStage
 from multimodal_to.ocp.transcription import Stage, assemble, symbolic
-from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.scenario import Scenario
 
 
@@ -34,18 +33,23 @@ def build(
         robot: whose motion it is.
         scenario: the task.
         formulation: what the problem is made of; by default `Formulation.executable()`.
-        initial: the state to start in, for a scenario whose start is `Start.GIVEN`; its CoM becomes `initial_com`.
+        initial: the state to start in, for a scenario whose start is `Start.GIVEN`; its CoM becomes `initial_com`. By
+            default it is that of the file `initial_state` of the scenario.
 
     Raises:
         ScenarioError: the scenario contradicts itself or does not fit the robot, or its start lacks a state.
+        TrajectoryError: the file of that state is missing or broken.
         InputError: there is a state for a scenario with another start, or it is of another robot.
         FormulationError: a term does not return what it has to, or is not a number at the start guess.
     """
     formulation = formulation or Formulation.executable()
+    scenario = scenario.for_robot(robot)
+    initial = initial or given.measured(scenario)
     robot, standing = prepared(robot, scenario)
     given.check(robot, scenario, initial)
     scenario = rebinding.started(robot, scenario, initial)
     outline = formulate(robot, scenario, standing, formulation, initial)
+    outline.refuse_crossed()
     layout = outline.layout
     stages = [named.stage for named in outline.stages]
     nlp = assemble(stages, layout.size, scenario.knots)
@@ -71,7 +75,7 @@ def build(
         row_lower=row_lower,
         row_upper=row_upper,
         rows=rows,
-        bound_rows=_bound_sets(outline.held, layout),
+        bound_rows=rebinding.bound_sets(outline.held, layout),
         cost_names=tuple(name for named in outline.stages for name in named.cost_names),
         guess=np.clip(guess, lower, upper),
         parameters=outline.parameters,
@@ -117,26 +121,6 @@ def _row_bounds(stages: Sequence[NamedStage]) -> tuple[Array, Array, dict[str, R
         high.append(np.tile(upper, repeats))
         first += height * repeats
     return np.concatenate(low), np.concatenate(high), sets
-
-
-def _bound_sets(held: Sequence[Held], layout: Layout) -> dict[str, BoundSet]:
-    """Return where each name's rows are among the bounds of x."""
-    sets = {}
-    for name in dict.fromkeys(some.term for some in held):
-        mine = [some for some in held if some.term == name]
-        counts = [some.knots.size for some in mine]
-        sets[name] = BoundSet(
-            index=np.concatenate(
-                [layout.rows[some.variable].start + some.row + layout.size * some.knots for some in mine]
-            ),
-            knots=np.concatenate([some.knots for some in mine]),
-            components=np.repeat(np.array([some.component for some in mine], dtype=np.str_), counts),
-            units=np.repeat(np.array([some.unit for some in mine], dtype=np.str_), counts),
-            scale=np.repeat([some.slope for some in mine], counts),
-            lower=np.repeat([some.lower for some in mine], counts),
-            upper=np.repeat([some.upper for some in mine], counts),
-        )
-    return sets
 
 
 def _refuse_no_numbers(problem: Problem, stages: Sequence[NamedStage]) -> None:

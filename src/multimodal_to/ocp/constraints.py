@@ -6,6 +6,7 @@ Equation numbers are those of L'Erario et al. 2022.
 from __future__ import annotations
 
 import casadi as cs
+import numpy as np
 
 from multimodal_to.adam import centroidal as rigid_body
 from multimodal_to.adam import quaternion
@@ -14,6 +15,7 @@ from multimodal_to.models import attitude, contact
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.scenarios.keyframes import attitude_at
 
 # -------------------------------------------------------------------- at a knot
 
@@ -115,16 +117,33 @@ def unit_quaternion(knot: Knot, parameters: Parameters) -> SX:
     return cs.sumsqr(knot.base_quaternion_xyzw) - 1
 
 
-def off_upright(knot: Knot, parameters: Parameters) -> SX:
+def off_upright_first(knot: Knot, parameters: Parameters) -> SX:
     """ρ̄⁻¹ ∘ ρ less none: half the angles from the upright ρ̄ about two level axes and the vertical, and w − 1.
 
-    ρ̄ is `Robot.upright`, with home's heading. The axes are the base's own, turned so that the last is the vertical.
+    ρ̄ is `Robot.upright`, with home's heading or, where a keyframe of the first knot asks for it, another attitude. The
+    axes are the base's own, turned so that the last is the vertical.
+    """
+    return off_attitude_at(knot, parameters, 0)
+
+
+def off_upright_last(knot: Knot, parameters: Parameters) -> SX:
+    """ρ̄⁻¹ ∘ ρ less none, as at the first knot, with what the keyframes of the last knot ask for."""
+    return off_attitude_at(knot, parameters, parameters.scenario.knots)
+
+
+def off_attitude_at(knot: Knot, parameters: Parameters, knot_index: int) -> SX:
+    """Return how far the base is off the attitude of a hover, (4, 1), as `off_upright_first` says.
+
+    Args:
+        knot: with the base.
+        parameters: with the robot and the scenario.
+        knot_index: which knot of the horizon it is.
     """
     robot = parameters.robot
-    upright = robot.upright
-    turn = quaternion.product(quaternion.conjugate(cs.DM(upright.base_quaternion_xyzw)), knot.base_quaternion_xyzw)
-    axes = attitude.axes_about(upright.base_transform[:3, :3].T @ robot.up)
-    return cs.vertcat(cs.DM(axes) @ turn[:3], turn[3] - 1)
+    asked = attitude_at(robot, parameters.scenario.placed(), knot_index)
+    turn = quaternion.product(quaternion.conjugate(cs.DM(asked)), knot.base_quaternion_xyzw)
+    vertical = np.array(quaternion.rotation_matrix(cs.DM(asked))).T @ robot.up
+    return cs.vertcat(cs.DM(attitude.axes_about(vertical)) @ turn[:3], turn[3] - 1)
 
 
 # -------------------------------------------------------------------- over an interval

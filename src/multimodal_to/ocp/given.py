@@ -16,8 +16,9 @@ from multimodal_to.models.state import State
 from multimodal_to.models.terrain import heights_below
 from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.variables import Bounds
-from multimodal_to.scenarios.scenario import Scenario, Start
-from multimodal_to.trajectory import rules
+from multimodal_to.scenarios.scenario import Scenario, Start, word
+from multimodal_to.trajectory import Trajectory, rules
+from multimodal_to.trajectory.states import state_at
 from multimodal_to.values import FrozenMapping
 
 NO_FORCE = 0.01
@@ -47,10 +48,26 @@ def check(robot: Robot, scenario: Scenario, initial: State | None) -> None:
         return
     if scenario.start is not Start.GIVEN:
         raise InputError(
-            f"a state to start in is given, but '{scenario.name}' starts in '{scenario.start.value}'; expected a "
+            f"a state to start in is given, but '{scenario.name}' starts in '{word(scenario.start)}'; expected a "
             "scenario with start 'given'"
         )
     initial.refuse_other_robot(robot)
+
+
+def measured(scenario: Scenario) -> State | None:
+    """Return the state in the trajectory file that a scenario names, if it names one.
+
+    Raises:
+        TrajectoryError: the file is missing or broken.
+        ScenarioError: it has no such knot.
+    """
+    if scenario.initial_state is None:
+        return None
+    motion = Trajectory.load(scenario.initial_state)
+    knot = motion.knots if scenario.initial_knot is None else scenario.initial_knot
+    if not 0 <= knot <= motion.knots:
+        raise ScenarioError(f"initial_knot is {knot}; '{scenario.initial_state}' has the knots 0 to {motion.knots}")
+    return state_at(motion, float(motion.time[knot]))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,10 +10,12 @@ import numpy as np
 from multimodal_to.adam import centroidal, quaternion
 from multimodal_to.adam.kinematics import Pose, forward_kinematics
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.attitude import signed_like
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Surface, heights_below
+from multimodal_to.ocp import waypoints
 from multimodal_to.ocp.gait import steps
 from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
@@ -27,10 +29,13 @@ _TILT_MAX = 0.6
 
 _ALONG_GROUND = np.array([[1.0], [1.0], [0.0]])
 """What takes the vertical part from positions side by side [1], (3, 1)."""
+IN_THE_AIR = 1e-3
+"""A contact point that is higher than this bears no force [m]."""
 LANDED = 0.3
 """Share of the horizon in which a motion from the air to the ground comes down [1]."""
 
 
+@checked
 def standing_posture(robot: Robot, surface: Surface, com: Vector3) -> Posture:
     """Return the posture nearest to home with every contact point on the ground and the CoM at `com` [m].
 
@@ -129,10 +134,11 @@ def base_transform(posture: Posture) -> Array:
 def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Layout) -> Array:
     """Return the start guess of every knot, (layout size, N + 1), in the variables' own units.
 
-    The standing posture moves with the CoM on the straight line from start to end. The contact points go along in x and
-    y, or step `guess_steps` times; they follow the ground, or fly along with a robot that starts in the air. Contact
-    forces carry the weight, unless thrusts do (`_weight_flown`). A motion from the air to the ground comes down in the
-    first `LANDED` of its knots, which leaves the turbines time to slow down. A robot without jets that has to be high
+    The standing posture moves with the CoM on straight lines from start to end, by way of what keyframes ask for, and
+    turns and bends as they ask. The contact points go along in x and y, or step `guess_steps` times; they follow the
+    ground, or fly along with a robot that starts in the air. Contact forces carry the weight, unless thrusts do
+    (`_weight_flown`); none acts at a point in the air. A motion from the air to the ground comes down in the first
+    `LANDED` of its knots, which leaves the turbines time to slow down. A robot without jets that has to be high
     at mid-horizon is thrown there. Everything else is zero.
 
     Args:
@@ -142,8 +148,8 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
         layout: of the variables of a knot.
     """
     knots = scenario.knots + 1
-    start, end = np.array(scenario.initial_com), np.array(scenario.final_com)
-    travelled = (end - start)[:, None] * _progress(scenario)
+    start = np.array(scenario.start_com)
+    travelled = _travelled(scenario)
     guess = np.zeros((layout.size, knots))
     view = layout.read(guess)
     view["com_position"][:] = start[:, None] + travelled
@@ -171,6 +177,9 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
             view[name][2] += speed
         points[:, 2] += rise
         shares = shares * (rise <= 0.0)
+    if scenario.keyframes:
+        points = waypoints.pose(robot, scenario, view, points)
+        shares = shares * (points[:, 2] - _ground(scenario, points) < IN_THE_AIR)
     view["contact_positions"][:] = points.reshape(-1, knots)
     view["contact_forces"][2::3] = robot.weight * (1.0 - flown) * shares
     return guess
@@ -196,21 +205,30 @@ def _lands(scenario: Scenario) -> bool:
     return scenario.start is not Start.STANDING and scenario.terminal is Terminal.STANDING
 
 
-def _progress(scenario: Scenario) -> Array:
-    """Return which share of the way is behind the robot at every knot, (N + 1,); one that lands is there early."""
+def _travelled(scenario: Scenario) -> Array:
+    """Return how far the CoM is from its start at every knot [m], (3, N + 1), by way of the keyframes.
+
+    One that lands is there early.
+    """
     share = np.linspace(0.0, 1.0, scenario.knots + 1)
-    return np.minimum(share / LANDED, 1.0) if _lands(scenario) else share
+    start = np.array(scenario.start_com)
+    if not scenario.keyframes_between():
+        progress = np.minimum(share / LANDED, 1.0) if _lands(scenario) else share
+        return np.asarray((np.array(scenario.end_com) - start)[:, None] * progress)
+    return np.asarray(waypoints.com(scenario, early=LANDED if _lands(scenario) else 1.0) - start[:, None])
 
 
 def _weight_flown(robot: Robot, scenario: Scenario) -> Array:
     """Return the share of the weight that the thrusts carry at every knot, (N + 1,).
 
     All of it for a motion that starts in the air, until it has landed; from there on they hand it over. On a walk into
-    the air they take it over. Otherwise the feet carry it.
+    the air they take it over. Between keyframes that hover or stand it changes evenly. Otherwise the feet carry it.
     """
     share = np.linspace(0.0, 1.0, scenario.knots + 1)
     if not robot.jets:
         return np.zeros_like(share)
+    if any(one.keyframe.hover or one.keyframe.standing for one in scenario.keyframes_between()):
+        return waypoints.flown(scenario)
     if scenario.start is not Start.STANDING:
         return np.minimum((1.0 - share) / (1.0 - LANDED), 1.0) if _lands(scenario) else np.ones_like(share)
     return share if scenario.terminal is Terminal.HOVER and scenario.guess_steps else np.zeros_like(share)

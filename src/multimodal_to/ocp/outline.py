@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from multimodal_to.errors import FormulationError, ScenarioError, listed
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.state import State
-from multimodal_to.ocp import given
-from multimodal_to.ocp.boundary import set_boundary
+from multimodal_to.ocp import given, keyframes
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.guess import standing_posture
 from multimodal_to.ocp.parameters import Parameters
@@ -27,6 +26,7 @@ class Outline:
     box: Bounds  # without the terms that are bounds
     stages: list[NamedStage]
     held: list[Held]  # the rows that are bounds
+    keyframe_terms: tuple[str, ...]  # names of the terms that are not the formulation's but the scenario's
     parameters: Parameters  # what its terms have read
     initial: State | None  # that a motion with a given start starts in
 
@@ -41,6 +41,26 @@ class Outline:
         return tuple(
             some.term for some in self.held if (some.variable, some.row) == (variable, row) and knot in some.knots
         )
+
+    def refuse_crossed(self) -> None:
+        """Make sure that what keyframes ask of single variables is within these variables' ranges.
+
+        Raises:
+            ScenarioError: it is not.
+            FormulationError: it would be without the terms of the formulation.
+        """
+        for some in self.held:
+            if some.term not in self.keyframe_terms or not _contradicts(some, self.bounds, self.layout):
+                continue
+            scale = self.layout.scale[self.layout.rows[some.variable].start + some.row]
+            knot = int(some.knots[0])
+            low, high = (side[some.variable][some.row, knot] for side in (self.box.lower, self.box.upper))
+            asked = " to ".join(dict.fromkeys(f"{limit * scale:.6g}" for limit in (some.lower, some.upper)))
+            found = f"{some.variable} {some.component} has to be {asked} at knot {knot} for '{some.term}'"
+            others = [name for name in self.terms_that_hold(some.variable, some.row, knot) if name != some.term]
+            if others and not _contradicts(some, self.box, self.layout):
+                raise FormulationError(f"the term '{listed(others)}' contradicts the start or the end: {found}")
+            raise ScenarioError(f"{found}, outside its range {low:.6g} to {high:.6g}")
 
 
 def formulate(
@@ -64,15 +84,23 @@ def formulate(
     bounds = box.copy()
     parameters = Parameters.of(robot, scenario, standing, _target(robot, scenario, standing))
     given.check(robot, scenario, initial)
-    stages, held = collect(formulation, parameters, layout, bounds)
-    set_boundary(box, robot, scenario, standing, formulation.rule.name, initial)
+    more = keyframes.terms(robot, scenario, formulation.rule.name)
+    stages, held = collect(formulation.with_terms(*more), parameters, layout, bounds)
+    keyframes.hold(box, robot, scenario, standing, formulation.rule.name, initial)
     try:
-        set_boundary(bounds, robot, scenario, standing, formulation.rule.name, initial)
+        keyframes.hold(bounds, robot, scenario, standing, formulation.rule.name, initial)
     except ScenarioError as error:  # without the terms it fits, as the line before has shown
         terms = dict.fromkeys(some.term for some in held if _contradicts(some, box, layout))
         raise FormulationError(f"the term '{listed(terms)}' contradicts the start or the end: {error}") from error
     return Outline(
-        layout=layout, bounds=bounds, box=box, stages=stages, held=held, parameters=parameters, initial=initial
+        layout=layout,
+        bounds=bounds,
+        box=box,
+        stages=stages,
+        held=held,
+        keyframe_terms=tuple(term.name for term in more),
+        parameters=parameters,
+        initial=initial,
     )
 
 
@@ -107,9 +135,9 @@ def prepared(robot: Robot, scenario: Scenario) -> tuple[Robot, Posture]:
 def _standing(robot: Robot, scenario: Scenario) -> Posture:
     """Return the posture in which the robot stands where the motion starts or, if in the air, ends; else upright."""
     if scenario.start is Start.STANDING:
-        return standing_posture(robot, scenario.surface, scenario.initial_com)
+        return standing_posture(robot, scenario.surface, scenario.start_com)
     if scenario.terminal is Terminal.STANDING:
-        return standing_posture(robot, scenario.surface, scenario.final_com)
+        return standing_posture(robot, scenario.surface, scenario.end_com)
     return robot.upright
 
 
@@ -119,7 +147,7 @@ def _target(robot: Robot, scenario: Scenario, standing: Posture) -> Posture:
     An end at which no posture is found is no error here: a solver may find one, or say what gives way.
     """
     stands = scenario.start is Start.STANDING and scenario.terminal is Terminal.STANDING
-    if stands and scenario.initial_com != scenario.final_com:
+    if stands and scenario.start_com != scenario.end_com:
         with suppress(ScenarioError):
-            return standing_posture(robot, scenario.surface, scenario.final_com)
+            return standing_posture(robot, scenario.surface, scenario.end_com)
     return standing

@@ -52,7 +52,8 @@ class _Each:
         return row_labels(parameters.robot, self.of, self.axes)
 
 
-def _each(of: str, *axes: str) -> Labels:
+def each(of: str, *axes: str) -> Labels:
+    """Return the labels of rows that are repeated for each "joint", "contact" or "jet"."""
     return _Each(of, axes or ("",))
 
 
@@ -120,14 +121,20 @@ UNIT_QUATERNION = Constraint(
 )
 UPRIGHT_FIRST = Constraint(
     name="upright_first",
-    value=constraints.off_upright,
+    value=constraints.off_upright_first,
     within=between(-UPRIGHT, UPRIGHT),
     unit="1",
     holds=Where.FIRST_KNOT,
     labels=("level 1", "level 2", "vertical", "w"),
     when=_hovers_first,
 )
-UPRIGHT_LAST = replace(UPRIGHT_FIRST, name="upright_last", holds=Where.LAST_KNOT, when=_hovers_last)
+UPRIGHT_LAST = replace(
+    UPRIGHT_FIRST,
+    name="upright_last",
+    value=constraints.off_upright_last,
+    holds=Where.LAST_KNOT,
+    when=_hovers_last,
+)
 COM_KINEMATICS = Constraint(value=constraints.com_kinematics, within=equal(), unit="m", labels=XYZ)
 ANGULAR_MOMENTUM_KINEMATICS = Constraint(
     value=constraints.angular_momentum_kinematics,
@@ -137,14 +144,14 @@ ANGULAR_MOMENTUM_KINEMATICS = Constraint(
     labels=XYZ,
 )
 CONTACT_KINEMATICS = Constraint(
-    value=constraints.contact_kinematics, within=equal(), unit="m", labels=_each("contact", *XYZ)
+    value=constraints.contact_kinematics, within=equal(), unit="m", labels=each("contact", *XYZ)
 )
 NON_PENETRATION = Constraint(
     name="non_penetration",
     value=constraints.heights,
     within=at_least(0.0),
     unit="m",
-    labels=_each("contact"),
+    labels=each("contact"),
     rigid=True,
 )
 FRICTION_CONE = Constraint(
@@ -160,21 +167,21 @@ COMPLEMENTARITY = Constraint(
     within=at_most(_complementarity_max),
     unit="N m",
     holds=Where.LATER_KNOTS,
-    labels=_each("contact"),
+    labels=each("contact"),
 )
 CONTACT_REACH = Constraint(
     value=constraints.contact_reach,
     within=between(-1.0, 1.0),
     unit="1",
     holds=Where.LATER_KNOTS,
-    labels=_each("contact", *XYZ),
+    labels=each("contact", *XYZ),
 )
 JET_REACH = Constraint(
     value=constraints.jet_reach,
     within=between(-1.0, 1.0),
     unit="1",
     holds=Where.LATER_KNOTS,
-    labels=_each("jet", *XYZ),
+    labels=each("jet", *XYZ),
 )
 STATIC_EQUILIBRIUM = Constraint(
     value=constraints.static_equilibrium,
@@ -191,7 +198,7 @@ STEADY_THRUST = Constraint(
     unit="N/s²",
     holds=Where.FIRST_KNOT,
     scale=FORCE,
-    labels=_each("jet"),
+    labels=each("jet"),
     when=_hovers_first,
 )
 MOMENTUM_DYNAMICS = Constraint(
@@ -219,7 +226,7 @@ JOINT_INTEGRATION = Constraint(
     within=equal(),
     unit=JointUnits("rad"),
     holds=Where.EVERY_INTERVAL,
-    labels=_each("joint"),
+    labels=each("joint"),
 )
 THRUST_INTEGRATION = Constraint(
     value=constraints.thrust_integration,
@@ -227,7 +234,7 @@ THRUST_INTEGRATION = Constraint(
     unit="N",
     holds=Where.EVERY_INTERVAL,
     scale=FORCE,
-    labels=_each("jet"),
+    labels=each("jet"),
 )
 THRUST_DYNAMICS = Constraint(
     value=constraints.thrust_dynamics,
@@ -235,14 +242,14 @@ THRUST_DYNAMICS = Constraint(
     unit="N/s",
     holds=Where.EVERY_INTERVAL,
     scale=FORCE,
-    labels=_each("jet"),
+    labels=each("jet"),
 )
 SLIDING = Constraint(
     value=constraints.sliding,
     within=between(_sliding_min, _sliding_max),
     unit="N m",
     holds=Where.EVERY_INTERVAL,
-    labels=_each("contact", "x", "y"),
+    labels=each("contact", "x", "y"),
 )
 STANDING_HEIGHT = Constraint(
     name="standing_height",
@@ -250,7 +257,7 @@ STANDING_HEIGHT = Constraint(
     within=between(0.0, ON_GROUND),
     unit="m",
     holds=Where.LAST_KNOT,
-    labels=_each("contact"),
+    labels=each("contact"),
     when=_stands_last,
     rigid=True,
 )
@@ -260,7 +267,7 @@ COMPLEMENTARITY_BEFORE = Constraint(
     within=at_most(_complementarity_max),
     unit="N m",
     holds=Where.EVERY_INTERVAL,
-    labels=_each("contact"),
+    labels=each("contact"),
 )
 COMPLEMENTARITY_AFTER = replace(
     COMPLEMENTARITY_BEFORE, name="complementarity_after", value=constraints.complementarity_after
@@ -283,7 +290,7 @@ FINAL_STEADY_THRUST = Constraint(
     unit="N/s²",
     holds=Where.LAST_KNOT,
     scale=FORCE,
-    labels=_each("jet"),
+    labels=each("jet"),
     when=_hovers_last,
 )
 MOMENTUM_AT_START = Constraint(
@@ -307,7 +314,7 @@ JOINT_VELOCITIES_AT_START = Constraint(
     within=equal(),
     unit=JointUnits("rad/s"),
     holds=Where.FIRST_INTERVAL,
-    labels=_each("joint"),
+    labels=each("joint"),
     when=_starts_given,
 )
 THRUST_RATE_AT_START = Constraint(
@@ -316,7 +323,7 @@ THRUST_RATE_AT_START = Constraint(
     unit="N/s",
     holds=Where.FIRST_INTERVAL,
     scale=FORCE,
-    labels=_each("jet"),
+    labels=each("jet"),
     when=_starts_given,
 )
 LEAPFROG = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +10,10 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.state import State
-from multimodal_to.ocp import given
-from multimodal_to.ocp.boundary import set_boundary
+from multimodal_to.ocp import given, keyframes
 from multimodal_to.ocp.guess import start_guess
-from multimodal_to.ocp.problem import Problem, RowSet
+from multimodal_to.ocp.problem import BoundSet, Problem, RowSet
+from multimodal_to.ocp.stages import Held, collect
 from multimodal_to.ocp.variables import Bounds, Layout, ranges
 from multimodal_to.scenarios.scenario import Scenario, Terminal
 
@@ -34,13 +35,14 @@ def rebind(problem: Problem, scenario: Scenario, initial: State | None = None) -
     scenario = started(robot, scenario, initial)
     standing = problem.parameters.standing
     box = ranges(robot, scenario, layout)
+    bound_rows = _bound_rows(problem, scenario)
     lower, upper = stacked(box, layout, scenario, scale)
-    for some in problem.bound_rows.values():
+    for some in bound_rows.values():
         np.maximum.at(lower, some.index, some.lower)
         np.minimum.at(upper, some.index, some.upper)
     bounds = Bounds(*(layout.read_horizon(side * scale) for side in (lower, upper)))
     for some_bounds in (box, bounds):
-        set_boundary(some_bounds, robot, scenario, standing, rule, initial)
+        keyframes.hold(some_bounds, robot, scenario, standing, rule, initial)
     lower, upper = stacked(bounds, layout, scenario, scale)
     box_lower, box_upper = stacked(box, layout, scenario, scale)
     row_lower, row_upper = problem.row_lower, problem.row_upper
@@ -56,9 +58,44 @@ def rebind(problem: Problem, scenario: Scenario, initial: State | None = None) -
         box_upper=box_upper,
         row_lower=row_lower,
         row_upper=row_upper,
+        bound_rows=bound_rows,
         guess=np.clip(problem.guess, lower, upper),
         initial=initial,
     )
+
+
+def _bound_rows(problem: Problem, scenario: Scenario) -> dict[str, BoundSet]:
+    """Return the rows of terms that are bounds, with those of the keyframes of a changed scenario."""
+    robot, rule = problem.robot, problem.formulation.rule.name
+    if scenario.placed() == problem.scenario.placed():
+        return problem.bound_rows
+    before, after = (keyframes.terms(robot, some, rule) for some in (problem.scenario, scenario))
+    parameters = replace(problem.parameters, scenario=scenario)
+    bounds = ranges(robot, scenario, problem.layout)
+    _, held = collect(replace(problem.formulation, terms=after), parameters, problem.layout, bounds)
+    names = {term.name for term in before}
+    others = {name: some for name, some in problem.bound_rows.items() if name not in names}
+    return others | bound_sets(held, problem.layout)
+
+
+def bound_sets(held: Sequence[Held], layout: Layout) -> dict[str, BoundSet]:
+    """Return where each name's rows are among the bounds of x."""
+    sets = {}
+    for name in dict.fromkeys(some.term for some in held):
+        mine = [some for some in held if some.term == name]
+        counts = [some.knots.size for some in mine]
+        sets[name] = BoundSet(
+            index=np.concatenate(
+                [layout.rows[some.variable].start + some.row + layout.size * some.knots for some in mine]
+            ),
+            knots=np.concatenate([some.knots for some in mine]),
+            components=np.repeat(np.array([some.component for some in mine], dtype=np.str_), counts),
+            units=np.repeat(np.array([some.unit for some in mine], dtype=np.str_), counts),
+            scale=np.repeat([some.slope for some in mine], counts),
+            lower=np.repeat([some.lower for some in mine], counts),
+            upper=np.repeat([some.upper for some in mine], counts),
+        )
+    return sets
 
 
 def same_terms(scenario: Scenario, other: Scenario) -> bool:
@@ -70,7 +107,7 @@ def same_terms(scenario: Scenario, other: Scenario) -> bool:
 
 
 def started(robot: Robot, scenario: Scenario, initial: State | None) -> Scenario:
-    """Return a scenario with the CoM of the state that it starts in, if it starts in a given one.
+    """Return a scenario with the CoM of the state that it starts in, in place of its file, if it starts in a given one.
 
     Args:
         robot: with the jets that the scenario uses.
@@ -80,7 +117,7 @@ def started(robot: Robot, scenario: Scenario, initial: State | None) -> Scenario
     if initial is None:
         return scenario
     x, y, z = (float(value) for value in given.com(robot, initial))
-    return replace(scenario, initial_com=(x, y, z))
+    return replace(scenario, initial_com=(x, y, z), initial_com_shift=None, initial_state=None, initial_knot=None)
 
 
 def stacked(bounds: Bounds, layout: Layout, scenario: Scenario, scale: Array) -> tuple[Array, Array]:

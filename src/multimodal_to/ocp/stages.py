@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as cs
@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import SX
+from multimodal_to.errors import FormulationError
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.lifting import Lifted
 from multimodal_to.ocp.parameters import Parameters
-from multimodal_to.ocp.terms import Constraint, Cost, Rows, Where
+from multimodal_to.ocp.terms import Constraint, Cost, Place, Rows, Term, Where
 from multimodal_to.ocp.transcription import Stage
 from multimodal_to.ocp.variables import Bounds, Layout
 from multimodal_to.scenarios.scenario import Start
@@ -54,7 +55,7 @@ class _Place:
     """What terms are given in a stage, for each place that it has."""
 
     name: str
-    at: Mapping[Where, Knot | Interval]
+    at: Mapping[Place, Knot | Interval]
     variables: SX  # that its knot rows may be bounds of
     starts: NDArray[np.int64]  # the first knot of each interval
     knots: NDArray[np.int64]  # that its knot rows are of
@@ -85,7 +86,7 @@ def collect(
     places = (
         _Place(
             name="first",
-            at={Where.FIRST_KNOT: start} | ({Where.EVERY_KNOT: start} if found else {}),
+            at=dict.fromkeys((Where.FIRST_KNOT, Where.EVERY_KNOT) if found else (Where.FIRST_KNOT,), start),
             variables=z,
             starts=first,
             knots=first,
@@ -113,7 +114,7 @@ def collect(
         ),
     )
     stages, held = list[NamedStage](), list[Held]()
-    for place in places:
+    for place in (*places, *_chosen(formulation.terms, places[0], places[2], interval, knots)):
         rows = list[tuple[str, Rows]]()
         for name, some in _rows(formulation.constraints, place, parameters):
             left, bound = _without_bounds(name, some, place, layout)
@@ -143,6 +144,37 @@ def collect(
     for some_bound in held:
         _tighten(bounds, layout, some_bound)
     return stages, held
+
+
+def _chosen(terms: Sequence[Term], first: _Place, later: _Place, interval: Interval, knots: int) -> Iterator[_Place]:
+    """Return the places of terms that are at chosen knots: one for the first knot, and one for each set of others.
+
+    Args:
+        terms: of the formulation.
+        first: the place of the first knot.
+        later: the place of all others.
+        interval: that ends at a later knot.
+        knots: N, the number of intervals.
+
+    Raises:
+        FormulationError: a term names a knot beyond the last.
+    """
+    found = dict[tuple[int, ...], dict[Place, Knot | Interval]]()
+    for term in terms:
+        for chosen in term.places:
+            if isinstance(chosen, Where):
+                continue
+            if max(chosen.ends) > knots:
+                raise FormulationError(
+                    f"the term '{term.name}' is at {chosen.value}; expected knots from 0 to {knots}, the last"
+                )
+            if 0 in chosen.ends:
+                found.setdefault((), {})[chosen] = first.at[Where.FIRST_KNOT]
+            if ends := tuple(sorted(knot for knot in chosen.ends if knot)):
+                found.setdefault(ends, {})[chosen] = interval if chosen.of_intervals else interval.end
+    for index, (ends, at) in enumerate(found.items(), 1):
+        own = replace(first if not ends else later, name=f"chosen_{index}", at=at)
+        yield replace(own, starts=np.array(ends) - 1, knots=np.array(ends)) if ends else own
 
 
 def _rows(constraints: Sequence[Constraint], place: _Place, parameters: Parameters) -> list[tuple[str, Rows]]:

@@ -70,6 +70,82 @@ class Where(Enum):
 
 
 @dataclass(frozen=True)
+class Knots:
+    """Chosen knots, as a place of a term that is a function of a knot: `Knots((35,))`; 0 is the first.
+
+    Raises:
+        FormulationError: there is none, one stands twice, or one is negative.
+    """
+
+    knots: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        _keep_numbers(self, "knots", 0)
+
+    @property
+    def of_intervals(self) -> bool:
+        """Return that a term there is a function of a knot."""
+        return False
+
+    @property
+    def value(self) -> str:
+        """Return the place in words."""
+        return f"knot {listed(map(str, self.knots))}"
+
+    @property
+    def ends(self) -> tuple[int, ...]:
+        """Return the knots."""
+        return self.knots
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Chosen intervals, as a place of a term that is a function of an interval, by the knots at which they end.
+
+    Raises:
+        FormulationError: there is none, one stands twice, or one ends before knot 1.
+    """
+
+    ends: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        _keep_numbers(self, "ends", 1)
+
+    @property
+    def of_intervals(self) -> bool:
+        """Return that a term there is a function of an interval."""
+        return True
+
+    @property
+    def value(self) -> str:
+        """Return the place in words."""
+        return f"interval that ends at knot {listed(map(str, self.ends))}"
+
+
+Place = Where | Knots | Intervals
+"""Where a term holds or is charged."""
+
+
+def _keep_numbers(place: Knots | Intervals, name: str, least: int) -> None:
+    """Keep the chosen knots as a tuple of whole numbers.
+
+    Args:
+        place: whose they are.
+        name: of its field.
+        least: which of them is the least that exists.
+
+    Raises:
+        FormulationError: they are not that.
+    """
+    numbers = getattr(place, name)
+    check_fields(place, FormulationError, f"{type(place).__name__}: ")
+    if not len(numbers) or len(set(numbers)) < len(numbers) or min(numbers) < least:
+        what = f"{type(place).__name__} is of {shown(tuple(numbers))}"
+        raise FormulationError(f"{what}; expected different whole numbers of at least {least}")
+    object.__setattr__(place, name, tuple(map(int, numbers)))
+
+
+@dataclass(frozen=True)
 class Within:
     """The set that a constraint keeps its rows in: lower ≤ row ≤ upper."""
 
@@ -144,7 +220,7 @@ class Constraint:
     within: Within
     unit: Units
     name: str = ""
-    holds: Where | tuple[Where, ...] = Where.EVERY_KNOT
+    holds: Place | tuple[Place, ...] = Where.EVERY_KNOT
     scale: float = 1.0
     labels: Labels = ()
     when: Callable[[Parameters], bool] | None = None
@@ -161,7 +237,7 @@ class Constraint:
         return (self.value.__doc__ or "").strip()
 
     @property
-    def places(self) -> tuple[Where, ...]:
+    def places(self) -> tuple[Place, ...]:
         """Return where the constraint holds."""
         return self.holds if isinstance(self.holds, tuple) else (self.holds,)
 
@@ -216,7 +292,7 @@ class Cost:
     weight: float | Callable[[Parameters], float | Array]
     unit: Units
     name: str = ""
-    charged: Where | tuple[Where, ...] = Where.LATER_KNOTS
+    charged: Place | tuple[Place, ...] = Where.LATER_KNOTS
     per_second: bool = True
     scale: float = 1.0
     when: Callable[[Parameters], bool] | None = None
@@ -232,7 +308,7 @@ class Cost:
         return (self.residual.__doc__ or "").strip()
 
     @property
-    def places(self) -> tuple[Where, ...]:
+    def places(self) -> tuple[Place, ...]:
         """Return where the cost is charged."""
         return self.charged if isinstance(self.charged, tuple) else (self.charged,)
 
@@ -296,8 +372,8 @@ def _complete(term: Constraint | Cost, function: Any, place: str) -> None:
         raise _wrong(name, "no report can call it that", f"name=... of at most {_LONGEST} printable characters")
     object.__setattr__(term, "name", name)
     places = term.places
-    if not places or not all(isinstance(entry, Where) for entry in places) or len(set(places)) < len(places):
-        raise _wrong(name, f"'{place}' is {shown(getattr(term, place))}", "different members of Where")
+    if not places or not all(isinstance(entry, Place) for entry in places) or len(set(places)) < len(places):
+        raise _wrong(name, f"'{place}' is {shown(getattr(term, place))}", "different members of Where, or Knots")
     if len({entry.of_intervals for entry in places}) > 1:
         raise _wrong(name, f"'{place}' names knots and intervals", "only knots, or only intervals")
     if not (isinstance(term.scale, int | float) and 0 < term.scale < math.inf):

@@ -11,11 +11,15 @@ from multimodal_to.scenarios.bundled import (
     take_off_and_landing,
     walk_to_fly,
 )
+from multimodal_to.scenarios.keyframes import FrameTarget, Keyframe, Momentum
 from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
 
 __all__ = [
     "SCENARIOS",
+    "FrameTarget",
+    "Keyframe",
     "Margins",
+    "Momentum",
     "Scenario",
     "Start",
     "Terminal",

@@ -13,6 +13,7 @@ from typing import Any
 from multimodal_to.errors import ScenarioError, shown
 from multimodal_to.files.records import Records
 from multimodal_to.models.terrain import SURFACES, FlatGround, Surface
+from multimodal_to.scenarios.keyframes import HOME
 from multimodal_to.scenarios.scenario import Margins, Scenario, Vector3
 from multimodal_to.trajectory import Trajectory
 
@@ -54,6 +55,11 @@ def from_dict(table: Mapping[str, Any], base: Scenario | None = None) -> Scenari
     """
     if isinstance(table, Mapping):
         table = dict(table)
+        for com in HEIGHTS.values():  # one way to say it replaces the other
+            ways = com in table, f"{com}_shift" in table
+            if base is not None and any(ways):
+                changed: dict[str, Any] = {com: getattr(base, com) if ways[0] else HOME, f"{com}_shift": None}
+                base = replace(base, **changed)
         for key, com in HEIGHTS.items():
             if key in table:
                 table[com] = _raised(table.pop(key), key, table.get(com, getattr(base, com, None)), com)
@@ -69,8 +75,9 @@ def _raised(height: Any, key: str, position: Any, com: str) -> Vector3:
         position: the CoM whose height it changes [m], as a file has it; None where there is none.
         com: what that CoM is called.
     """
-    if position is None:
-        raise ScenarioError(f"'{key}' changes '{com}', which the scenario lacks")
+    if position is None or isinstance(position, str):
+        lacks = "which the scenario lacks" if position is None else f"which is '{position}'"
+        raise ScenarioError(f"'{key}' changes '{com}', {lacks}; expected '{com}' with three numbers")
     x, y, _ = RECORDS.value(Vector3, position, com)
     z: float = RECORDS.value(float, height, key)
     return x, y, z

@@ -1,26 +1,30 @@
 """Scenarios as TOML files that a person writes, and changes of single values.
 
 A file holds the fields of a `Scenario` by name, with tables `[weights]` and `[surface]`; with `based_on = "take-off"`
-only what differs from that bundled scenario.
+only what differs from that bundled scenario. What `replace` lists is not changed but written anew.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
 from multimodal_to.arguments import checked
-from multimodal_to.errors import MultimodalError, ScenarioError, shortened, shown
+from multimodal_to.errors import MultimodalError, ScenarioError, shortened, shown, unknown
 from multimodal_to.files.numbers import number
 from multimodal_to.files.reading import parse_toml, read_toml
 from multimodal_to.files.writing import write_text
+from multimodal_to.models.robot import bundled_robots
+from multimodal_to.models.terrain import FlatGround
 from multimodal_to.scenarios.bundled import find
 from multimodal_to.scenarios.data import from_dict, to_dict
-from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.scenarios.scenario import Margins, Scenario, Weights
+from multimodal_to.values import FrozenMapping
 
 
 @checked
@@ -33,17 +37,59 @@ def load(path: str | os.PathLike[str]) -> Scenario:
     source = Path(path)
     table = read_toml(source, ScenarioError)
     try:
-        return _scenario(table, source.stem)
+        return _beside(_scenario(table, source.stem), source.parent)
     except MultimodalError as error:
         raise ScenarioError(f"{source}: {error}") from error
 
 
 def _scenario(table: dict[str, Any], name: str) -> Scenario:
     table = {"name": name, **table}
-    parent = table.pop("based_on", None)
+    parent, emptied = table.pop("based_on", None), table.pop("replace", [])
     if parent is not None and not isinstance(parent, str):
         raise ScenarioError(f"'based_on' is {shown(parent)}; expected the name of a bundled scenario")
-    return from_dict(table, find(parent) if parent is not None else None)
+    if not isinstance(emptied, list) or not all(isinstance(key, str) for key in emptied):
+        raise ScenarioError(
+            f"'replace' is {shown(emptied)}; expected a list of keys, as [\"weights.joint_velocities\"]"
+        )
+    if parent is None:
+        if emptied:
+            raise ScenarioError("'replace' empties what a bundled scenario says; expected 'based_on' beside it")
+        return from_dict(table)
+    base = find(parent)
+    for key in emptied:
+        if key not in EMPTIED:
+            raise ScenarioError(unknown("key of 'replace'", key, EMPTIED))
+        outer, _, inner = key.partition(".")
+        value = replace(getattr(base, outer), **{inner: EMPTIED[key]()}) if inner else EMPTIED[key]()
+        base = replace(base, **{outer: value})
+    return from_dict(table, base)
+
+
+EMPTIED: Mapping[str, Callable[[], Any]] = FrozenMapping(
+    {
+        "weights": Weights,
+        "weights.joint_velocities": dict,
+        "margins": Margins,
+        "surface": FlatGround,
+        "allowances": dict,
+    }
+)
+"""What a file can write anew with `replace`, and what stands there before it does."""
+
+
+def _beside(scenario: Scenario, folder: Path) -> Scenario:
+    """Return a scenario with the paths that its file says as they are from here.
+
+    Args:
+        scenario: as its file says it.
+        folder: of that file.
+    """
+    paths: dict[str, Any] = {}
+    if scenario.robot is not None and scenario.robot not in bundled_robots():
+        paths["robot"] = os.path.abspath(folder / scenario.robot)
+    if scenario.initial_state is not None:
+        paths["initial_state"] = os.path.abspath(folder / scenario.initial_state)
+    return replace(scenario, **paths) if paths else scenario
 
 
 @checked

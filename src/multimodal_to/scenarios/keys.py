@@ -7,6 +7,7 @@ from dataclasses import replace
 from multimodal_to.files.keys import Key, keys_of
 from multimodal_to.scenarios.bundled import SCENARIOS
 from multimodal_to.scenarios.data import HEIGHTS, RECORDS
+from multimodal_to.scenarios.files import EMPTIED
 from multimodal_to.scenarios.scenario import Scenario
 
 
@@ -19,6 +20,13 @@ def scenario_keys() -> tuple[Key, ...]:
         default="none",
         meaning="The bundled scenario that the file changes; the file then holds only what differs",
     )
+    emptied = Key(
+        name="replace",
+        kind=f"list of some of {', '.join(EMPTIED)}",
+        unit="",
+        default="none",
+        meaning="Tables of the bundled scenario that the file writes anew, instead of changing single keys of them",
+    )
     name, *others = keys_of(Scenario, RECORDS.unions)
     heights = (
         Key(
@@ -30,4 +38,4 @@ def scenario_keys() -> tuple[Key, ...]:
         )
         for height, com in HEIGHTS.items()
     )
-    return base, replace(name, default="the file's own name"), *others, *heights
+    return base, emptied, replace(name, default="the file's own name"), *others, *heights

@@ -54,6 +54,7 @@ class Planner:
         formulation: Formulation | None = None,
         solver: Solver | None = None,
     ) -> None:
+        scenario = scenario.for_robot(robot)
         self._robot, self._scenario, self._formulation = robot, scenario, formulation
         self._solver = solver or Ipopt()
         self._problem = self._built(scenario, None)
@@ -160,7 +161,7 @@ def _at_rest(robot: Robot, scenario: Scenario) -> State:
     """Return the home posture at rest, with its CoM where the scenario says; what a planner is built with."""
     home = State.at_rest(robot)
     posture = Posture(
-        base_position=home.base_position + np.array(scenario.initial_com) - home.com(robot),
+        base_position=home.base_position + np.array(scenario.start_com) - home.com(robot),
         base_quaternion_xyzw=home.base_quaternion_xyzw,
         joint_positions=home.joint_positions,
     )

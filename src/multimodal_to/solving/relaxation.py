@@ -15,6 +15,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.native.stage_solver import KktStructure
+from multimodal_to.ocp import keyframes, margins, paper
 from multimodal_to.ocp.problem import Problem
 from multimodal_to.solving import linear_solvers, machine, stages
 from multimodal_to.solving.ipopt import Ipopt, Pass
@@ -26,6 +27,8 @@ from multimodal_to.values import Value
 
 GIVES_WAY = 1e-4
 """What a row has to give way by to be named, in solver units: 0.1 mm, 5e-3 N."""
+PHYSICS = 100.0
+"""How much more it costs that a row of physics gives way than one of the task."""
 _NEARNESS = 1e-5
 """What half the squared distance from the start costs, in solver units: little enough to move no row's price."""
 
@@ -36,6 +39,7 @@ class Relaxation(Value):
 
     status: Status  # of the relaxed problem
     gives_way: tuple[Violation, ...]  # terms, the largest amount first; none: all can be met
+    price: float  # Σ of all amounts, weighted, in solver units
     trajectory: Trajectory  # the motion that is left
     iterations: int
     solve_time: float  # [s]
@@ -47,8 +51,10 @@ def relax(
 ) -> Relaxation:
     """Return which terms of a problem have to give way, and by how much, for the others and all bounds to hold.
 
-    Minimises Σ (s⁺ + s⁻) + ½ κ |x − x₀|² subject to the bounds of x, s⁺, s⁻ ≥ 0 and the terms' bounds on
+    Minimises Σ w (s⁺ + s⁻) + ½ κ |x − x₀|² subject to the bounds of x, s⁺, s⁻ ≥ 0 and the terms' bounds on
     g(x) + s⁺ − s⁻, in solver units. The sum of absolute values (l1) puts what has to give way on few rows; κ is small.
+    What is asked of the motion, by keyframes, reach, margins and terms of one's own, has w = 1, and physics has
+    `PHYSICS`: it gives way only where no other row can.
 
     Args:
         problem: from `build`.
@@ -74,6 +80,7 @@ def relax(
     return Relaxation(
         status=Ipopt.status(str(statistics["return_status"])),
         gives_way=unmet_terms(problem, rows, bounds, GIVES_WAY),
+        price=float(elastic.weights @ slacks),
         trajectory=motion(problem, x),
         iterations=int(statistics["iter_count"]),
         solve_time=time.perf_counter() - started,
@@ -87,6 +94,7 @@ class _Elastic:
     lower: Array  # of all rows, in solver units
     upper: Array
     chosen: NDArray[np.int64]  # the rows that may give way
+    weights: Array  # of these
     bound_index: NDArray[np.int64]  # into x, of the rows behind g
     bound_terms: dict[str, slice]  # where each term stands among the rows behind g
     x_lower: Array  # of x, without the terms that may give way
@@ -104,12 +112,19 @@ class _Elastic:
                 np.maximum.at(x_lower, some.index, some.lower)
                 np.minimum.at(x_upper, some.index, some.upper)
         behind = [problem.bound_rows[name] for name in places]
-        chosen = [problem.rows[name].index for name in terms if name in problem.rows]
-        count = problem.row_lower.size
+        count, asked = problem.row_lower.size, asked_terms(problem)
+        prices = np.full(count + first, PHYSICS)
+        for name in terms:
+            if name in asked:
+                prices[problem.rows[name].index if name in problem.rows else []] = 1.0
+                prices[count:][places.get(name, slice(0))] = 1.0
+        rows = [problem.rows[name].index for name in terms if name in problem.rows]
+        chosen = np.sort(np.concatenate([*rows, count + np.arange(first)])).astype(np.int64)
         return cls(
             lower=np.concatenate([problem.row_lower, *(some.lower for some in behind)]),
             upper=np.concatenate([problem.row_upper, *(some.upper for some in behind)]),
-            chosen=np.sort(np.concatenate([*chosen, count + np.arange(first)])).astype(np.int64),
+            chosen=chosen,
+            weights=prices[chosen],
             bound_index=np.concatenate([np.zeros(0, dtype=np.int64), *(some.index for some in behind)]),
             bound_terms=places,
             x_lower=x_lower,
@@ -119,6 +134,14 @@ class _Elastic:
     def split(self, amounts: Array, rows: int) -> tuple[Array, dict[str, Array]]:
         """Return amounts of all rows as those of g, and those of the terms behind them by name."""
         return amounts[:rows], {name: amounts[rows:][place] for name, place in self.bound_terms.items()}
+
+
+def asked_terms(problem: Problem) -> set[str]:
+    """Return the names of the terms that are no physics: what the task asks for, and how far its plan keeps away."""
+    keyframe_terms = keyframes.terms(problem.robot, problem.scenario, problem.formulation.rule.name)
+    reach = (paper.CONTACT_REACH, paper.JET_REACH, paper.UPRIGHT_FIRST, paper.UPRIGHT_LAST)
+    names = {term.name for term in (*keyframe_terms, *reach, *margins.CONSTRAINTS)}
+    return names | set(problem.formulation.own_terms)
 
 
 def _structure(problem: Problem, elastic: _Elastic) -> KktStructure:
@@ -192,8 +215,9 @@ def _relaxed(problem: Problem, elastic: _Elastic, start: Array) -> tuple[dict[st
     spread = cs.DM(cs.Sparsity(all_rows, slack_count, list(range(slack_count + 1)), elastic.chosen.tolist()), 1.0)
     pick = cs.DM.triplet(list(range(bounds.size)), bounds.tolist(), cs.DM.ones(bounds.size), bounds.size, count)
     added = cs.mtimes(spread, up - down)
-    objective = cs.sum1(up) + cs.sum1(down) + 0.5 * _NEARNESS * cs.sumsqr(x - start)
-    gradient = cs.vertcat(_NEARNESS * (x - start), cs.DM.ones(2 * slack_count))
+    weights = cs.DM(elastic.weights)
+    objective = cs.dot(weights, up + down) + 0.5 * _NEARNESS * cs.sumsqr(x - start)
+    gradient = cs.vertcat(_NEARNESS * (x - start), weights, weights)
     g, jacobian = problem.nlp.jacobian(x, p)
     whole = cs.vertcat(g, cs.mtimes(pick, x)) + added
     slopes = cs.horzcat(cs.vertcat(jacobian, pick), spread, -spread)
