@@ -34,7 +34,17 @@ from multimodal_to.ocp import (
     build,
     equal,
 )
-from multimodal_to.scenarios import Margins, Scenario, Start, Terminal, Weights
+from multimodal_to.scenarios import (
+    ContactState,
+    ContactStretch,
+    GaitKind,
+    GaitPlan,
+    Margins,
+    Scenario,
+    Start,
+    Terminal,
+    Weights,
+)
 from multimodal_to.scenarios import files as scenario_files
 from multimodal_to.solving import (
     Ending,
@@ -54,12 +64,16 @@ from multimodal_to.trajectory.states import state_at
 __all__ = [
     "Audit",
     "Constraint",
+    "ContactState",
+    "ContactStretch",
     "Cost",
     "Diagnosis",
     "Ending",
     "FlatGround",
     "Formulation",
     "FrictionCone",
+    "GaitKind",
+    "GaitPlan",
     "HeightField",
     "Interval",
     "Ipopt",

@@ -54,6 +54,11 @@ def heights(knot: Knot, parameters: Parameters) -> SX:
     return cs.vertcat(*(parameters.surface.distance(point) for point in knot.points))
 
 
+def contact_forces(knot: Knot, parameters: Parameters) -> SX:
+    """f_i."""
+    return knot.contact_forces
+
+
 def friction_cone(knot: Knot, parameters: Parameters) -> SX:
     """|t·f| ≤ μ n·f as the scenario's pyramid or cone, which holds n·f ≥ 0 as well (eq. 12, 18, 19)."""
     inside = contact.FRICTION[parameters.scenario.friction_cone]
@@ -199,6 +204,15 @@ def sliding(interval: Interval, parameters: Parameters) -> SX:
 def sliding_after(interval: Interval, parameters: Parameters) -> SX:
     """|t·(p_i⁺ − p_i)| n·f_i ≤ ε_t: a point stays where it is until half an interval after the knot of its force."""
     return _slips(interval, interval.start.forces, parameters)
+
+
+def slips(interval: Interval, parameters: Parameters) -> SX:
+    """t·(p_i⁺ − p_i): how far each point moves along the ground."""
+    moves = [
+        parameters.surface.tangents(after).T @ (after - before)
+        for before, after in zip(interval.start.points, interval.end.points, strict=True)
+    ]
+    return cs.vertcat(*moves)
 
 
 def _slips(interval: Interval, forces: list[SX], parameters: Parameters) -> SX:

@@ -14,7 +14,9 @@ from multimodal_to.errors import ScenarioError
 from multimodal_to.models.attitude import signed_like
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Surface, heights_below
-from multimodal_to.ocp.gait import steps
+from multimodal_to.ocp.flights import flights, interval, thrown
+from multimodal_to.ocp.gait import footfalls, steps
+from multimodal_to.ocp.schedule import Schedule
 from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 
@@ -132,8 +134,9 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     The standing posture moves with the CoM on the straight line from start to end. The contact points go along in x and
     y, or step `guess_steps` times; they follow the ground, or fly along with a robot that starts in the air. Contact
     forces carry the weight, unless thrusts do (`_weight_flown`). A motion from the air to the ground comes down in the
-    first `LANDED` of its knots, which leaves the turbines time to slow down. A robot without jets that has to be high
-    at mid-horizon is thrown there. Everything else is zero.
+    first `LANDED` of its knots, which leaves the turbines time to slow down. Where contacts are given, feet that are
+    off swing, and the others bear the weight. A robot without jets is thrown where all its feet are off, or where it
+    has to be high at mid-horizon. Everything else is zero.
 
     Args:
         robot: with the jets that the scenario uses.
@@ -143,7 +146,8 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     """
     knots = scenario.knots + 1
     start, end = np.array(scenario.initial_com), np.array(scenario.final_com)
-    travelled = (end - start)[:, None] * _progress(scenario)
+    schedule = Schedule.of(robot, scenario)
+    travelled = (end - start)[:, None] * _progress(scenario, schedule)
     guess = np.zeros((layout.size, knots))
     view = layout.read(guess)
     view["com_position"][:] = start[:, None] + travelled
@@ -153,42 +157,34 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     view["base_quaternion_xyzw"][:] = signed_like(standing.base_quaternion_xyzw, upright)[:, None]
     view["joint_positions"][:] = standing.joint_positions[:, None]
 
-    flown = _weight_flown(robot, scenario)
+    flown = _weight_flown(robot, scenario, schedule)
     _set_jets(robot, scenario, view, flown)
     feet = [contact.foot for contact in robot.contacts]
-    moved, shares = steps(feet, robot.gait, scenario, travelled) if scenario.guess_steps else _glide(feet, travelled)
+    if schedule.given.any():
+        moved, shares = footfalls(robot, schedule, travelled)
+    else:
+        moved, shares = (
+            steps(feet, robot.gait, scenario, travelled) if scenario.guess_steps else _glide(feet, travelled)
+        )
+    in_air = flights(robot, scenario, schedule, float(view["com_position"][2, scenario.knots // 2]))
+    rise, speed = thrown(robot, scenario, in_air)
+    moved[:, 2] = np.maximum(moved[:, 2], rise)
+    shares = shares * (rise <= 0.0)
     moved = moved + away[:, :1] * _ALONG_GROUND
     stands = contact_positions(robot, standing).reshape(-1, 3, 1)
     points = stands + moved
     points[:, 2] += _ground(scenario, points) - _ground(scenario, stands)
     if scenario.start is not Start.STANDING:
         points[:, 2] = np.maximum(points[:, 2], (stands + away)[:, 2])  # the feet fly along
-    if scenario.mid_height_min is not None and not robot.jets:
-        rise, speed = hop(robot, scenario, view["com_position"][2])
-        for name in ("com_position", "base_position"):
-            view[name][2] += rise
-        for name in ("com_velocity", "base_linear_velocity"):
-            view[name][2] += speed
-        points[:, 2] += rise
-        shares = shares * (rise <= 0.0)
+    along = np.gradient(travelled, interval(scenario), axis=1) * (rise > 0.0)
+    for name in ("com_position", "base_position"):
+        view[name][2] += rise
+    for name in ("com_velocity", "base_linear_velocity"):
+        view[name][:] += along
+        view[name][2] += speed
     view["contact_positions"][:] = points.reshape(-1, knots)
     view["contact_forces"][2::3] = robot.weight * (1.0 - flown) * shares
     return guess
-
-
-def hop(robot: Robot, scenario: Scenario, heights: Array) -> tuple[Array, Array]:
-    """Return how far the robot is above its stance [m], and its speed [m/s], (N + 1,) each: a throw to mid-horizon.
-
-    Args:
-        robot: without jets.
-        scenario: its `mid_height_min` is what the throw reaches.
-        heights: of the CoM while it stands [m], (N + 1,).
-    """
-    middle, interval = scenario.knots // 2, 0.5 * (scenario.interval_min + scenario.interval_max)
-    gravity = float(np.linalg.norm(robot.gravity))
-    times = interval * (np.arange(scenario.knots + 1) - middle)
-    rise = np.maximum((scenario.mid_height_min or 0.0) - heights[middle] - 0.5 * gravity * times**2, 0.0)
-    return rise, np.where(rise > 0.0, -gravity * times, 0.0)
 
 
 def _lands(scenario: Scenario) -> bool:
@@ -196,21 +192,30 @@ def _lands(scenario: Scenario) -> bool:
     return scenario.start is not Start.STANDING and scenario.terminal is Terminal.STANDING
 
 
-def _progress(scenario: Scenario) -> Array:
-    """Return which share of the way is behind the robot at every knot, (N + 1,); one that lands is there early."""
+def _progress(scenario: Scenario, schedule: Schedule) -> Array:
+    """Return which share of the way is behind the robot at every knot, (N + 1,); one that lands is there early.
+
+    Where contacts are given, the robot goes on while a point of it is off.
+    """
     share = np.linspace(0.0, 1.0, scenario.knots + 1)
+    if (off := schedule.off.any(axis=0)).any():
+        return np.asarray(np.cumsum(off) / off.sum())
     return np.minimum(share / LANDED, 1.0) if _lands(scenario) else share
 
 
-def _weight_flown(robot: Robot, scenario: Scenario) -> Array:
+def _weight_flown(robot: Robot, scenario: Scenario, schedule: Schedule) -> Array:
     """Return the share of the weight that the thrusts carry at every knot, (N + 1,).
 
     All of it for a motion that starts in the air, until it has landed; from there on they hand it over. On a walk into
-    the air they take it over. Otherwise the feet carry it.
+    the air they take it over. Otherwise the feet carry it. Where all feet are given to be off, the thrusts do.
     """
-    share = np.linspace(0.0, 1.0, scenario.knots + 1)
     if not robot.jets:
-        return np.zeros_like(share)
+        return np.zeros(scenario.knots + 1)
+    return np.where(schedule.in_air, 1.0, _usually_flown(scenario))
+
+
+def _usually_flown(scenario: Scenario) -> Array:
+    share = np.linspace(0.0, 1.0, scenario.knots + 1)
     if scenario.start is not Start.STANDING:
         return np.minimum((1.0 - share) / (1.0 - LANDED), 1.0) if _lands(scenario) else np.ones_like(share)
     return share if scenario.terminal is Terminal.HOVER and scenario.guess_steps else np.zeros_like(share)

@@ -62,7 +62,7 @@ def formulate(
     layout = Layout.of(robot, formulation.variables)
     box = ranges(robot, scenario, layout)
     bounds = box.copy()
-    parameters = Parameters.of(robot, scenario, standing, _target(robot, scenario, standing))
+    parameters = Parameters.of(robot, scenario, standing, _target(robot, scenario, standing), formulation.rule.name)
     given.check(robot, scenario, initial)
     stages, held = collect(formulation, parameters, layout, bounds)
     set_boundary(box, robot, scenario, standing, formulation.rule.name, initial)

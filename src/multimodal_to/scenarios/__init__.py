@@ -11,10 +11,16 @@ from multimodal_to.scenarios.bundled import (
     take_off_and_landing,
     walk_to_fly,
 )
+from multimodal_to.scenarios.contacts import ContactState, ContactStretch
+from multimodal_to.scenarios.gaits import GaitKind, GaitPlan
 from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
 
 __all__ = [
     "SCENARIOS",
+    "ContactState",
+    "ContactStretch",
+    "GaitKind",
+    "GaitPlan",
     "Margins",
     "Scenario",
     "Start",

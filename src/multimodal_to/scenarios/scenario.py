@@ -12,6 +12,8 @@ from multimodal_to.errors import ScenarioError, shown
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Surface
+from multimodal_to.scenarios.contacts import ContactStretch
+from multimodal_to.scenarios.gaits import GaitPlan
 from multimodal_to.values import FrozenMapping
 
 Vector3 = tuple[float, float, float]
@@ -196,10 +198,15 @@ class Scenario:
     """Limits of the audit's properties by name, where they are wider than the audit's own [the property's own]."""
     guess_steps: int = 0
     """How many steps the feet take in the start guess, in turns [1]; with 0 they glide along with the CoM."""
+    contacts: tuple[ContactStretch, ...] = ()
+    """Which feet stand and which are in the air, over which stretches; what is not given is found."""
+    gait: GaitPlan | None = None
+    """Steps in a pattern, which give every foot; what `contacts` says beside it holds instead."""
 
     def __post_init__(self) -> None:
         check_fields(self, ScenarioError)
         object.__setattr__(self, "allowances", FrozenMapping(self.allowances))
+        object.__setattr__(self, "contacts", tuple(self.contacts))
         self._check_name()
         self._check_numbers()
         self._check_positions()
