@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from multimodal_to.auditing.contacts import CONTACTS
 from multimodal_to.auditing.margins import MARGINS
 from multimodal_to.auditing.property import Judged, Of, Property
 from multimodal_to.auditing.self_collision import SELF_COLLISION
@@ -453,7 +454,16 @@ _TASK = (
 PROPERTIES: Mapping[str, Property] = FrozenMapping(
     {
         entry.name: entry
-        for entry in (*_PHYSICS, *_INTEGRATION, *_ACTUATION_AND_CONTACT, *_ORDER, *SELF_COLLISION, *MARGINS, *_TASK)
+        for entry in (
+            *_PHYSICS,
+            *_INTEGRATION,
+            *_ACTUATION_AND_CONTACT,
+            *_ORDER,
+            *SELF_COLLISION,
+            *MARGINS,
+            *_TASK,
+            *CONTACTS,
+        )
     }
 )
 """Every property by name, in the order of an audit's findings."""

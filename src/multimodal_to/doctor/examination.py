@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from multimodal_to.arguments import checked
+from multimodal_to.doctor.contacts import contacts
 from multimodal_to.doctor.diagnosis import Diagnosis, Symptom, error
 from multimodal_to.doctor.formulation import formulation
 from multimodal_to.doctor.ground import height, hold
@@ -35,6 +36,7 @@ CHECKS: tuple[Check, ...] = (
     hold,
     reach,
     trim,
+    contacts,
 )
 """What is asked of every task."""
 ONCE_SOUND: tuple[Check, ...] = (formulation,)

@@ -206,15 +206,6 @@ def sliding_after(interval: Interval, parameters: Parameters) -> SX:
     return _slips(interval, interval.start.forces, parameters)
 
 
-def slips(interval: Interval, parameters: Parameters) -> SX:
-    """t·(p_i⁺ − p_i): how far each point moves along the ground."""
-    moves = [
-        parameters.surface.tangents(after).T @ (after - before)
-        for before, after in zip(interval.start.points, interval.end.points, strict=True)
-    ]
-    return cs.vertcat(*moves)
-
-
 def _slips(interval: Interval, forces: list[SX], parameters: Parameters) -> SX:
     products = [
         contact.sliding(parameters.surface, after, force, after - before)

@@ -144,7 +144,7 @@ NON_PENETRATION = Constraint(
     unit="m",
     labels=_each("contact"),
     rigid=True,
-    present=contacts.not_standing,
+    present=contacts.not_held,
 )
 FRICTION_CONE = Constraint(
     value=constraints.friction_cone,
@@ -255,7 +255,7 @@ STANDING_HEIGHT = Constraint(
     labels=_each("contact"),
     when=_stands_last,
     rigid=True,
-    present=contacts.not_standing,
+    present=contacts.not_held,
 )
 
 COMPLEMENTARITY_BEFORE = Constraint(
