@@ -76,6 +76,7 @@ def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         "GaitPlan": mt.GaitPlan(kind=mt.GaitKind.WALK, steps=4, clearance=0.01),
         "Interval": mt.Interval(at, knot(robot), cs.SX.sym("dt"), LEAPFROG),
         "Ipopt": mt.Ipopt(max_iterations=3),
+        "JetFailure": mt.JetFailure(jet="left", at=0.5),
         "KinDynComputations": robot.kindyn,
         "Knot": at,
         "Margins": mt.Margins(torque=0.5),

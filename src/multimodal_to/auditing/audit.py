@@ -14,6 +14,7 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
 from multimodal_to.auditing.contacts import contact_findings
+from multimodal_to.auditing.failures import failure_findings
 from multimodal_to.auditing.findings import Finding, Motion, Worst, largest, worst_of
 from multimodal_to.auditing.integrator import integrator_findings
 from multimodal_to.auditing.margins import margin_findings
@@ -106,6 +107,7 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         *margin_findings(motion, scenario),
         *(task_findings(motion, scenario) if scenario else ()),
         *(contact_findings(motion, scenario) if scenario else ()),
+        *(failure_findings(motion, scenario) if scenario else ()),
     )
     findings = _findings(worst, motion, scenario)
     return Audit(

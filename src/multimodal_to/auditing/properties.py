@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from multimodal_to.auditing.contacts import CONTACTS
+from multimodal_to.auditing.failures import FAILURES
 from multimodal_to.auditing.margins import MARGINS
 from multimodal_to.auditing.property import Judged, Of, Property
 from multimodal_to.auditing.self_collision import SELF_COLLISION
@@ -463,6 +464,7 @@ PROPERTIES: Mapping[str, Property] = FrozenMapping(
             *MARGINS,
             *_TASK,
             *CONTACTS,
+            *FAILURES,
         )
     }
 )

@@ -26,6 +26,7 @@ class Judged(Enum):
     WITH_TOUCH_DOWN = "the scenario asks for a `touch_down_speed`"
     WITH_MID_HEIGHT = "the scenario has a `mid_height_min`"
     WITH_CONTACTS = "the scenario gives contacts"
+    WITH_FAILURES = "the scenario lets jets fail"
     STANDING_START = "the scenario starts standing"
     HOVERING_START = "the scenario starts in a hover"
     START_AT_REST = "the scenario starts standing or in a hover"
@@ -49,6 +50,7 @@ class Judged(Enum):
             Judged.WITH_TOUCH_DOWN: scenario.margins.touch_down_speed > 0.0,
             Judged.WITH_MID_HEIGHT: scenario.mid_height_min is not None,
             Judged.WITH_CONTACTS: bool(scenario.contacts or scenario.gait),
+            Judged.WITH_FAILURES: bool(scenario.failures),
             Judged.STANDING_START: scenario.start is Start.STANDING,
             Judged.HOVERING_START: scenario.start is Start.HOVER,
             Judged.START_AT_REST: scenario.start is not Start.GIVEN,

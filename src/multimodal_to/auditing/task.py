@@ -7,6 +7,7 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Motion, Worst, worst_of
 from multimodal_to.models.attitude import tilt
+from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 from multimodal_to.trajectory.derived import at_knots, surface_frames, without_acceleration
 
@@ -26,7 +27,7 @@ def _start(motion: Motion, scenario: Scenario) -> list[Worst]:
     if scenario.start is Start.STANDING:
         findings += [*_standing("start", motion, 0, scenario), _no_thrust(motion)]
     if scenario.start is Start.HOVER:
-        findings += _hover("start", motion, 0)
+        findings += _hover("start", motion, 0, scenario)
     return [*findings, *_equilibrium("start", motion, 0)]
 
 
@@ -39,7 +40,7 @@ def _end(motion: Motion, scenario: Scenario) -> list[Worst]:
         findings += _standing("end", motion, last, scenario)
     if scenario.terminal is Terminal.HOVER:
         known = last + without_acceleration(motion.trajectory)  # the last knot, or the one before it
-        findings += [*_hover("end", motion, last), *_equilibrium("end", motion, known)]
+        findings += [*_hover("end", motion, last, scenario), *_equilibrium("end", motion, known)]
     return findings
 
 
@@ -105,22 +106,27 @@ def _standing(when: str, motion: Motion, knot: int, scenario: Scenario) -> list[
     return [worst_of(f"{when}: feet off the ground", np.abs(heights)[:, None], motion.robot.contact_names, knot)]
 
 
-def _hover(when: str, motion: Motion, knot: int) -> list[Worst]:
-    """No contact force, an upright base, and thrusts that carry the weight and hold still.
+def _hover(when: str, motion: Motion, knot: int, scenario: Scenario) -> list[Worst]:
+    """No contact force, an upright base, and thrusts that carry the weight and hold still, but for jets that failed.
 
     Args:
         when: "start" or "end", with which the properties' names begin.
         motion: that is judged.
         knot: at which.
+        scenario: with the jets that fail.
     """
     trajectory, weight = motion.trajectory, motion.robot.mass * motion.robot.gravity
     upright = motion.robot.upright.base_transform[:3, :3]
+    failed = failing_knots(scenario.failures, motion.robot.jet_names, trajectory.knots)
+    running = [row for row in range(len(motion.robot.jets)) if not 0 < failed.get(row, 0) <= knot]
+    all_run = len(running) == len(motion.robot.jets)
+    held = knot if all_run else knot + without_acceleration(trajectory)  # one that has failed is still running down
     off = tilt(motion.base[knot, :3, :3], upright, motion.robot.up)
     return [
         _at(f"{when}: contact force", knot, np.abs(trajectory.contact_forces[:, knot])),
         _at(f"{when}: base off upright", knot, np.array(off)),
-        _at(f"{when}: thrust off weight", knot, np.abs(motion.thrusts[:, knot].sum(axis=0) + weight)),
-        _at(f"{when}: thrust rate", knot, np.abs(trajectory.thrust_rate[:, knot])),
+        _at(f"{when}: thrust off weight", held, np.abs(motion.thrusts[:, held].sum(axis=0) + weight)),
+        _at(f"{when}: thrust rate", knot, np.abs(trajectory.thrust_rate[running, knot])),
     ]
 
 

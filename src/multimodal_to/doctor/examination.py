@@ -12,7 +12,7 @@ from multimodal_to.doctor.ground import height, hold
 from multimodal_to.doctor.hover import trim
 from multimodal_to.doctor.reach import reach
 from multimodal_to.doctor.task import Task
-from multimodal_to.doctor.thrust import spool_up_time, weight
+from multimodal_to.doctor.thrust import failures, spool_up_time, weight
 from multimodal_to.doctor.travel import leap, push, speed
 from multimodal_to.doctor.weighing import allowances, costs, groups, scales
 from multimodal_to.errors import MultimodalError
@@ -28,6 +28,7 @@ CHECKS: tuple[Check, ...] = (
     costs,
     scales,
     weight,
+    failures,
     spool_up_time,
     speed,
     push,

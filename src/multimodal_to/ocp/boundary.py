@@ -10,6 +10,7 @@ from multimodal_to.models.state import State
 from multimodal_to.ocp import given
 from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.variables import Bounds
+from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 from multimodal_to.trajectory import rules
 
@@ -36,7 +37,7 @@ def set_boundary(
         given.set_start(bounds, robot, scenario, initial, rule)
     else:
         _set_start(bounds, robot, scenario, standing)
-    _set_end(bounds, scenario, rule)
+    _set_end(bounds, robot, scenario, rule)
     if scenario.mid_height_min is not None:
         low = bounds.lower["com_position"]
         low[2, scenario.knots // 2] = max(low[2, scenario.knots // 2], scenario.mid_height_min)
@@ -59,7 +60,15 @@ def _set_start(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Postu
     fix("throttle", 0, np.array(idle))
 
 
-def _set_end(bounds: Bounds, scenario: Scenario, rule: str) -> None:
+def _set_end(bounds: Bounds, robot: Robot, scenario: Scenario, rule: str) -> None:
+    """Hold the last knots.
+
+    Args:
+        bounds: of every variable at every knot; they are changed.
+        robot: with the jets that the scenario uses.
+        scenario: the task.
+        rule: name of the integration rule.
+    """
     fix, last = bounds.fix, scenario.knots
     fix("com_position", last, np.array(scenario.final_com))
     if scenario.terminal is Terminal.FREE:
@@ -71,8 +80,10 @@ def _set_end(bounds: Bounds, scenario: Scenario, rule: str) -> None:
     for name in ("com_velocity", "angular_momentum"):
         fix(name, last - 1, 0.0)
     if scenario.terminal is Terminal.HOVER:
+        failed = failing_knots(scenario.failures, robot.jet_names, last)
         for knot in (last - 1, last):
-            fix("thrust_rate", knot, 0.0)
+            running = {row for row in range(len(robot.jets)) if not 0 < failed.get(row, 0) <= knot}
+            fix("thrust_rate", knot, 0.0, rows=sorted(running))  # one that has failed is still running down
         # Where velocities are between knots, the forces of the knot before the last one make the last velocity.
         for knot in (last - 1, last) if rules.instant(rule, "com_velocity") else (last,):
             fix("contact_forces", knot, 0.0, within=given.NO_FORCE)

@@ -18,6 +18,7 @@ from multimodal_to.ocp.flights import flights, interval, thrown
 from multimodal_to.ocp.gait import footfalls, steps
 from multimodal_to.ocp.schedule import Schedule
 from multimodal_to.ocp.variables import Layout
+from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 
 _CONTACT_TOLERANCE = 1e-6
@@ -228,10 +229,14 @@ def _ground(scenario: Scenario, points: Array) -> Array:
 
 
 def _set_jets(robot: Robot, scenario: Scenario, view: dict[str, Array], flown: Array) -> None:
-    """Let all jets push alike, as much as their limits allow."""
+    """Let all jets that have not failed push alike, as much as their limits allow."""
     interval = 0.5 * (scenario.interval_min + scenario.interval_max)
+    works = np.ones((len(robot.jets), scenario.knots + 1))
+    for row, knot in failing_knots(scenario.failures, robot.jet_names, scenario.knots).items():
+        works[row, knot:] = 0.0
+    shares = works / np.maximum(works.sum(axis=0), 1.0)
     for index, jet in enumerate(robot.jets):
-        thrust = np.minimum(flown * robot.weight / len(robot.jets), jet.thrust_max)
+        thrust = np.minimum(flown * robot.weight * shares[index], jet.thrust_max)
         throttle = [jet.model.steady_throttle(value) for value in thrust]
         view["thrust"][index] = thrust
         view["thrust_rate"][index, 1:] = np.diff(thrust) / interval

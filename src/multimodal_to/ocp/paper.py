@@ -12,7 +12,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.contact import FACES
-from multimodal_to.ocp import constraints, contacts, costs
+from multimodal_to.ocp import constraints, contacts, costs, failures
 from multimodal_to.ocp.contacts import ON_GROUND
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import (
@@ -292,6 +292,7 @@ FINAL_STEADY_THRUST = Constraint(
     scale=FORCE,
     labels=_each("jet"),
     when=_hovers_last,
+    present=failures.running,
 )
 MOMENTUM_AT_START = Constraint(
     value=constraints.momentum_at_start,
@@ -365,6 +366,7 @@ CONSTRAINTS = (
     SLIDING,
     STANDING_HEIGHT,
     *contacts.CONSTRAINTS,
+    *failures.CONSTRAINTS,
 )
 
 # -------------------------------------------------------------------- costs

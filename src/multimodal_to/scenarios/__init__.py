@@ -12,6 +12,7 @@ from multimodal_to.scenarios.bundled import (
     walk_to_fly,
 )
 from multimodal_to.scenarios.contacts import ContactState, ContactStretch
+from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitKind, GaitPlan
 from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
 
@@ -21,6 +22,7 @@ __all__ = [
     "ContactStretch",
     "GaitKind",
     "GaitPlan",
+    "JetFailure",
     "Margins",
     "Scenario",
     "Start",

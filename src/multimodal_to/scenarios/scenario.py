@@ -13,6 +13,7 @@ from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Surface
 from multimodal_to.scenarios.contacts import ContactStretch
+from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitPlan
 from multimodal_to.values import FrozenMapping
 
@@ -202,11 +203,14 @@ class Scenario:
     """Which feet stand and which are in the air, over which stretches; what is not given is found."""
     gait: GaitPlan | None = None
     """Steps in a pattern, which give every foot; what `contacts` says beside it holds instead."""
+    failures: tuple[JetFailure, ...] = ()
+    """Jets that fail, and when."""
 
     def __post_init__(self) -> None:
         check_fields(self, ScenarioError)
         object.__setattr__(self, "allowances", FrozenMapping(self.allowances))
         object.__setattr__(self, "contacts", tuple(self.contacts))
+        object.__setattr__(self, "failures", tuple(self.failures))
         self._check_name()
         self._check_numbers()
         self._check_positions()
