@@ -64,6 +64,7 @@ def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return {
         **surfaces,
         "Audit": mt.audit(robot, trajectory, scenario),
+        "Box": mt.Box(lower=[0, 0, 0], upper=(1.0, 1.0, 1.0), inside=True),
         "Constraint": mt.Constraint(value=least_weight, within=mt.at_least(least_weight), unit=["N"], labels=["z"]),
         "ContactState": mt.ContactState.OFF,
         "ContactStretch": mt.ContactStretch(of=["left"], state=mt.ContactState.ON, end=0.5),
@@ -91,6 +92,7 @@ def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         "Status": mt.Status.OPTIMAL,
         "Terminal": mt.Terminal.FREE,
         "Trajectory": trajectory,
+        "Wall": mt.Wall(normal=[0, 0, 2], offset=0.1, of="body"),
         "Weights": weights,
         "Where": mt.Where.LAST_KNOT,
     }

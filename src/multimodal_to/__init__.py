@@ -35,6 +35,7 @@ from multimodal_to.ocp import (
     equal,
 )
 from multimodal_to.scenarios import (
+    Box,
     ContactState,
     ContactStretch,
     GaitKind,
@@ -44,6 +45,7 @@ from multimodal_to.scenarios import (
     Scenario,
     Start,
     Terminal,
+    Wall,
     Weights,
 )
 from multimodal_to.scenarios import files as scenario_files
@@ -64,6 +66,7 @@ from multimodal_to.trajectory.states import state_at
 
 __all__ = [
     "Audit",
+    "Box",
     "Constraint",
     "ContactState",
     "ContactStretch",
@@ -98,6 +101,7 @@ __all__ = [
     "Status",
     "Terminal",
     "Trajectory",
+    "Wall",
     "Watch",
     "Weights",
     "Where",

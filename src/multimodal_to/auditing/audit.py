@@ -19,6 +19,7 @@ from multimodal_to.auditing.findings import Finding, Motion, Worst, largest, wor
 from multimodal_to.auditing.integrator import integrator_findings
 from multimodal_to.auditing.margins import margin_findings
 from multimodal_to.auditing.properties import GAPS, PROPERTIES, check_allowances
+from multimodal_to.auditing.regions import region_findings
 from multimodal_to.auditing.self_collision import link_findings
 from multimodal_to.auditing.task import task_findings
 from multimodal_to.auditing.thrust import thrust_findings
@@ -108,6 +109,7 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
         *(task_findings(motion, scenario) if scenario else ()),
         *(contact_findings(motion, scenario) if scenario else ()),
         *(failure_findings(motion, scenario) if scenario else ()),
+        *(region_findings(motion, scenario) if scenario else ()),
     )
     findings = _findings(worst, motion, scenario)
     return Audit(

@@ -15,6 +15,7 @@ from multimodal_to.auditing.contacts import CONTACTS
 from multimodal_to.auditing.failures import FAILURES
 from multimodal_to.auditing.margins import MARGINS
 from multimodal_to.auditing.property import Judged, Of, Property
+from multimodal_to.auditing.regions import REGIONS
 from multimodal_to.auditing.self_collision import SELF_COLLISION
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.models.robot import Robot
@@ -465,6 +466,7 @@ PROPERTIES: Mapping[str, Property] = FrozenMapping(
             *_TASK,
             *CONTACTS,
             *FAILURES,
+            *REGIONS,
         )
     }
 )

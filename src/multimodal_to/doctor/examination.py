@@ -11,6 +11,7 @@ from multimodal_to.doctor.formulation import formulation
 from multimodal_to.doctor.ground import height, hold
 from multimodal_to.doctor.hover import trim
 from multimodal_to.doctor.reach import reach
+from multimodal_to.doctor.regions import regions
 from multimodal_to.doctor.task import Task
 from multimodal_to.doctor.thrust import failures, spool_up_time, weight
 from multimodal_to.doctor.travel import leap, push, speed
@@ -38,6 +39,7 @@ CHECKS: tuple[Check, ...] = (
     reach,
     trim,
     contacts,
+    regions,
 )
 """What is asked of every task."""
 ONCE_SOUND: tuple[Check, ...] = (formulation,)

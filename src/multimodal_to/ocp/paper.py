@@ -12,7 +12,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.contact import FACES
-from multimodal_to.ocp import constraints, contacts, costs, failures
+from multimodal_to.ocp import constraints, contacts, costs, failures, regions
 from multimodal_to.ocp.contacts import ON_GROUND
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import (
@@ -367,6 +367,7 @@ CONSTRAINTS = (
     STANDING_HEIGHT,
     *contacts.CONSTRAINTS,
     *failures.CONSTRAINTS,
+    regions.ROOM,
 )
 
 # -------------------------------------------------------------------- costs

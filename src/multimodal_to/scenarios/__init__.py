@@ -14,10 +14,12 @@ from multimodal_to.scenarios.bundled import (
 from multimodal_to.scenarios.contacts import ContactState, ContactStretch
 from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitKind, GaitPlan
+from multimodal_to.scenarios.regions import Box, Wall
 from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
 
 __all__ = [
     "SCENARIOS",
+    "Box",
     "ContactState",
     "ContactStretch",
     "GaitKind",
@@ -27,6 +29,7 @@ __all__ = [
     "Scenario",
     "Start",
     "Terminal",
+    "Wall",
     "Weights",
     "find",
     "jump",

@@ -15,6 +15,7 @@ from multimodal_to.models.terrain import FlatGround, Surface
 from multimodal_to.scenarios.contacts import ContactStretch
 from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitPlan
+from multimodal_to.scenarios.regions import Box, Wall
 from multimodal_to.values import FrozenMapping
 
 Vector3 = tuple[float, float, float]
@@ -205,12 +206,16 @@ class Scenario:
     """Steps in a pattern, which give every foot; what `contacts` says beside it holds instead."""
     failures: tuple[JetFailure, ...] = ()
     """Jets that fail, and when."""
+    walls: tuple[Wall, ...] = ()
+    """Half-spaces that the robot stays in."""
+    boxes: tuple[Box, ...] = ()
+    """Boxes that the robot keeps out of, or stays in."""
 
     def __post_init__(self) -> None:
         check_fields(self, ScenarioError)
         object.__setattr__(self, "allowances", FrozenMapping(self.allowances))
-        object.__setattr__(self, "contacts", tuple(self.contacts))
-        object.__setattr__(self, "failures", tuple(self.failures))
+        for label in ("contacts", "failures", "walls", "boxes"):
+            object.__setattr__(self, label, tuple(getattr(self, label)))
         self._check_name()
         self._check_numbers()
         self._check_positions()
