@@ -33,7 +33,7 @@ def weight(task: Task) -> Iterator[Symptom]:
     elif not task.lifts:
         yield error(
             "thrust",
-            f"the robot has to hover at the {when}, but it weighs {robot.weight:.0f} N ({robot.mass:.1f} kg) and its "
+            f"the robot has to hover at the {when}, but it weighs {robot.weight:.0f} N ({robot.mass:.1f} kg) and "
             f"{_count(task)} together hold at most {task.thrusts_held.sum():.0f} N",
             "take a lighter robot or stronger jets, or a start and terminal on the ground",
         )
@@ -59,7 +59,9 @@ def failures(task: Task) -> Iterator[Symptom]:
 
 def _count(task: Task) -> str:
     count = len(task.robot.jets)
-    return f"{count} jets" if not task.lost else f"{count - len(task.lost)} jets that have not failed"
+    return (
+        f"its {count} jets" if not task.lost else f"the jets that have not failed, {count - len(task.lost)} of {count},"
+    )
 
 
 def spool_up_time(task: Task) -> Iterator[Symptom]:
