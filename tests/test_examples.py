@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from places import EXAMPLES
@@ -13,7 +14,34 @@ def an_own_scenario_is_met(printed, trajectory):
     assert trajectory.com_position[:, -1] == pytest.approx([0.0, 0.0, 0.8], abs=1e-8)
 
 
-ALSO = {"07_own_scenario": an_own_scenario_is_met}
+def it_trots(printed, trajectory):
+    """Four feet step twice each, as high as asked, and none of them slips; it stands at the end in MuJoCo as well."""
+    assert printed.count(" m high") == 8
+    assert printed.count("0.030 m high") == 8
+    assert "MuJoCo: it stands" in printed
+    points, forces = trajectory.per_contact("contact_positions"), trajectory.per_contact("contact_forces")
+    stands = (forces[:, 2, 1:] > 1.0) & (forces[:, 2, :-1] > 1.0)
+    assert np.abs(np.diff(points[:, :2], axis=2)).max(axis=1)[stands].max() < 1e-5
+    assert trajectory.com_position[0, -1] == pytest.approx(0.3, abs=1e-5)
+
+
+def it_steps_aside(printed, trajectory):
+    assert printed.count(" foot from ") == 4
+    assert "MuJoCo: it stands" in printed
+    assert trajectory.com_position[1, -1] == pytest.approx(0.3, abs=1e-5)
+
+
+def a_jet_has_failed(printed, trajectory):
+    assert "left chest: 0 N in the hover" in printed
+    assert np.abs(trajectory.thrust[trajectory.jet_names.index("left chest")]).max() < 1e-6
+
+
+ALSO = {
+    "07_own_scenario": an_own_scenario_is_met,
+    "11_trot": it_trots,
+    "12_sidesteps": it_steps_aside,
+    "13_failed_jet": a_jet_has_failed,
+}
 """What else an example shows; in the same test, since another would wait until the example has run."""
 
 

@@ -39,7 +39,23 @@ from multimodal_to.ocp import (
     equal,
     standing_posture,
 )
-from multimodal_to.scenarios import FrameTarget, Keyframe, Margins, Momentum, Scenario, Start, Terminal, Weights
+from multimodal_to.scenarios import (
+    Box,
+    ContactState,
+    ContactStretch,
+    FrameTarget,
+    GaitKind,
+    GaitPlan,
+    JetFailure,
+    Keyframe,
+    Margins,
+    Momentum,
+    Scenario,
+    Start,
+    Terminal,
+    Wall,
+    Weights,
+)
 from multimodal_to.scenarios import files as scenario_files
 from multimodal_to.solving import (
     Ending,
@@ -59,7 +75,10 @@ from multimodal_to.trajectory.states import state_at
 
 __all__ = [
     "Audit",
+    "Box",
     "Constraint",
+    "ContactState",
+    "ContactStretch",
     "Cost",
     "Diagnosis",
     "Ending",
@@ -67,10 +86,13 @@ __all__ = [
     "Formulation",
     "FrameTarget",
     "FrictionCone",
+    "GaitKind",
+    "GaitPlan",
     "HeightField",
     "Interval",
     "Intervals",
     "Ipopt",
+    "JetFailure",
     "Keyframe",
     "KinDynComputations",
     "Knot",
@@ -93,6 +115,7 @@ __all__ = [
     "Status",
     "Terminal",
     "Trajectory",
+    "Wall",
     "Watch",
     "Weights",
     "Where",

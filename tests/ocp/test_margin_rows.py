@@ -15,10 +15,12 @@ from multimodal_to.models import capsule_pairs
 from multimodal_to.models.contact import DESCENT_RATE
 from multimodal_to.models.sole import PRESSURE_SLACK, soles
 from multimodal_to.ocp import costs, margins
-from multimodal_to.ocp.guess import base_transform, contact_positions, hop, standing_posture, start_guess
+from multimodal_to.ocp.flights import flights, thrown
+from multimodal_to.ocp.guess import base_transform, contact_positions, standing_posture, start_guess
 from multimodal_to.ocp.integration import BACKWARD_EULER, LEAPFROG, Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.ocp.schedule import Schedule
 from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios import Margins
 from multimodal_to.trajectory.derived import largest_torques
@@ -422,7 +424,8 @@ def test_a_robot_that_jumps_is_guessed_to_be_thrown_there(ironcub):
 
 def test_what_is_high_enough_already_is_not_thrown(ironcub):
     scenario = replace(mt.scenarios.jump(), mid_height_min=0.5)
-    rise, speed = hop(ironcub.with_jets(()), scenario, np.full(scenario.knots + 1, 0.57))
+    robot = ironcub.with_jets(())
+    rise, speed = thrown(robot, scenario, flights(robot, scenario, Schedule.of(robot, scenario), 0.57))
     assert (np.abs(rise).max(), np.abs(speed).max()) == (0.0, 0.0)
 
 

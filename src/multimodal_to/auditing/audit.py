@@ -13,10 +13,13 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
+from multimodal_to.auditing.contacts import contact_findings
+from multimodal_to.auditing.failures import failure_findings
 from multimodal_to.auditing.findings import Finding, Motion, Worst, largest, worst_of
 from multimodal_to.auditing.integrator import integrator_findings
 from multimodal_to.auditing.margins import margin_findings
 from multimodal_to.auditing.properties import GAPS, PROPERTIES, check_allowances
+from multimodal_to.auditing.regions import region_findings
 from multimodal_to.auditing.self_collision import link_findings
 from multimodal_to.auditing.task import task_findings
 from multimodal_to.auditing.thrust import thrust_findings
@@ -132,6 +135,9 @@ def _of_all(motion: Motion, scenario: Scenario | None) -> tuple[Worst, ...]:
         *link_findings(robot, trajectory),
         *margin_findings(motion, scenario),
         *(task_findings(motion, scenario) if scenario else ()),
+        *(contact_findings(motion, scenario) if scenario else ()),
+        *(failure_findings(motion, scenario) if scenario else ()),
+        *(region_findings(motion, scenario) if scenario else ()),
     )
 
 

@@ -13,8 +13,11 @@ from collections.abc import Mapping
 
 from multimodal_to.arguments import checked
 from multimodal_to.auditing import keyframes
+from multimodal_to.auditing.contacts import CONTACTS
+from multimodal_to.auditing.failures import FAILURES
 from multimodal_to.auditing.margins import MARGINS
 from multimodal_to.auditing.property import Judged, Of, Property
+from multimodal_to.auditing.regions import REGIONS
 from multimodal_to.auditing.self_collision import SELF_COLLISION
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.models.robot import Robot
@@ -459,7 +462,18 @@ _TASK = (
 PROPERTIES: Mapping[str, Property] = FrozenMapping(
     {
         entry.name: entry
-        for entry in (*_PHYSICS, *_INTEGRATION, *_ACTUATION_AND_CONTACT, *_ORDER, *SELF_COLLISION, *MARGINS, *_TASK)
+        for entry in (
+            *_PHYSICS,
+            *_INTEGRATION,
+            *_ACTUATION_AND_CONTACT,
+            *_ORDER,
+            *SELF_COLLISION,
+            *MARGINS,
+            *_TASK,
+            *CONTACTS,
+            *FAILURES,
+            *REGIONS,
+        )
     }
 )
 """Every property by name, in the order of an audit's findings."""

@@ -28,6 +28,9 @@ class Judged(Enum):
     WITH_KEYFRAMES = "a keyframe of the scenario asks for it"
     WITH_MID_HEIGHT = "the scenario has a `mid_height_min`"
     WITH_END_COM = "the scenario says where the CoM ends"
+    WITH_CONTACTS = "the scenario gives contacts"
+    WITH_FAILURES = "the scenario lets jets fail"
+    WITH_REGIONS = "the scenario has walls or boxes"
     STANDING_START = "the scenario starts standing"
     HOVERING_START = "the scenario starts in a hover"
     START_AT_REST = "the scenario starts standing or in a hover"
@@ -53,6 +56,9 @@ class Judged(Enum):
             Judged.WITH_KEYFRAMES: bool(scenario.keyframes),
             Judged.WITH_MID_HEIGHT: scenario.mid_height_min is not None,
             Judged.WITH_END_COM: scenario.final_com is not None,
+            Judged.WITH_CONTACTS: bool(scenario.contacts or scenario.gait),
+            Judged.WITH_FAILURES: bool(scenario.failures),
+            Judged.WITH_REGIONS: bool(scenario.walls or scenario.boxes),
             Judged.STANDING_START: scenario.start is Start.STANDING,
             Judged.HOVERING_START: scenario.start is Start.HOVER,
             Judged.START_AT_REST: scenario.start is not Start.GIVEN,

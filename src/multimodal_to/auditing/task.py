@@ -10,6 +10,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing import keyframes
 from multimodal_to.auditing.findings import Motion, Worst, worst_of
 from multimodal_to.models.attitude import tilt
+from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.keyframes import attitude_at
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 from multimodal_to.trajectory.derived import at_knots, surface_frames, without_acceleration
@@ -130,23 +131,27 @@ def _standing(when: str, motion: Motion, knot: int, scenario: Scenario) -> list[
 
 
 def _hover(when: str, motion: Motion, knot: int, scenario: Scenario) -> list[Worst]:
-    """No contact force, an upright base, and thrusts that carry the weight and hold still.
+    """No contact force, an upright base, and thrusts that carry the weight and hold still, but for jets that failed.
 
     Args:
         when: "start" or "end", with which the properties' names begin.
         motion: that is judged.
         knot: at which.
-        scenario: whose keyframes may ask for another attitude than upright.
+        scenario: with the jets that fail; its keyframes may ask for another attitude than upright.
     """
     trajectory, weight = motion.trajectory, motion.robot.mass * motion.robot.gravity
     asked = attitude_at(motion.robot, scenario.placed(), knot)
     upright = replace(motion.robot.upright, base_quaternion_xyzw=asked).base_transform[:3, :3]
+    failed = failing_knots(scenario.failures, motion.robot.jet_names, trajectory.knots)
+    running = [row for row in range(len(motion.robot.jets)) if not 0 < failed.get(row, 0) <= knot]
+    all_run = len(running) == len(motion.robot.jets)
+    held = knot if all_run else knot + without_acceleration(trajectory)  # one that has failed is still running down
     off = tilt(motion.base[knot, :3, :3], upright, motion.robot.up)
     return [
         _at(f"{when}: contact force", knot, np.abs(trajectory.contact_forces[:, knot])),
         _at(f"{when}: base off upright", knot, np.array(off)),
-        _at(f"{when}: thrust off weight", knot, np.abs(motion.thrusts[:, knot].sum(axis=0) + weight)),
-        _at(f"{when}: thrust rate", knot, np.abs(trajectory.thrust_rate[:, knot])),
+        _at(f"{when}: thrust off weight", held, np.abs(motion.thrusts[:, held].sum(axis=0) + weight)),
+        _at(f"{when}: thrust rate", knot, np.abs(trajectory.thrust_rate[running, knot])),
     ]
 
 

@@ -15,6 +15,7 @@ from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.schedule import Flags
 
 LONG_LEVER = 100.0
 """A lever far longer than any robot [m]: forces are met first, and what is left over is a moment if it can be one."""
@@ -43,7 +44,9 @@ class Residual:
         return f"{self.force:.3g} N and {self.moment:.3g} N m"
 
 
-def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, lever: float | None = None) -> Residual:
+def residual(
+    task: Task, posture: Posture, *, feet: bool | Flags, thrusts: Array, lever: float | None = None
+) -> Residual:
     """Return the least residual, ‖force‖₁ + ‖moment‖₁ / lever, of a posture at rest.
 
     Contact forces lie in the friction pyramid, which holds the second-order cone.
@@ -51,7 +54,7 @@ def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, lever:
     Args:
         task: robot and scenario.
         posture: where everything is.
-        feet: whether the contact points push.
+        feet: whether the contact points push, or which of them do, (contacts,).
         thrusts: the greatest thrust of each jet [N], (jets,).
         lever: what moments are divided by [m], by default `lever_of`; with an infinite one forces act wherever they are
             wanted.
@@ -70,7 +73,7 @@ def residual(task: Task, posture: Posture, *, feet: bool, thrusts: Array, lever:
     missed = np.vstack([np.eye(6), np.zeros((cone.shape[0], 6))])
     matrix = np.hstack([matrix, missed, -missed])
     counts = np.array([1.0] * 3 + [1.0 / lever] * 3)
-    reach = np.full(forces.shape[0], np.inf if feet else 0.0)
+    reach = np.where(np.repeat(np.broadcast_to(feet, len(robot.contacts)), 3), np.inf, 0.0)
     programme = cs.conic(
         "balance",
         "highs",

@@ -6,13 +6,15 @@ from collections.abc import Callable, Iterator
 
 from multimodal_to.arguments import checked
 from multimodal_to.doctor import keyframes
+from multimodal_to.doctor.contacts import contacts
 from multimodal_to.doctor.diagnosis import Diagnosis, Symptom, error
 from multimodal_to.doctor.formulation import formulation
 from multimodal_to.doctor.ground import height, hold
 from multimodal_to.doctor.hover import trim
 from multimodal_to.doctor.reach import reach
+from multimodal_to.doctor.regions import regions
 from multimodal_to.doctor.task import Task
-from multimodal_to.doctor.thrust import spool_up_time, weight
+from multimodal_to.doctor.thrust import failures, spool_up_time, weight
 from multimodal_to.doctor.travel import leap, push, speed
 from multimodal_to.doctor.weighing import allowances, costs, groups, scales
 from multimodal_to.errors import InputError, MultimodalError, ScenarioError, TrajectoryError
@@ -29,6 +31,7 @@ CHECKS: tuple[Check, ...] = (
     costs,
     scales,
     weight,
+    failures,
     spool_up_time,
     speed,
     push,
@@ -42,6 +45,8 @@ CHECKS: tuple[Check, ...] = (
     keyframes.stands,
     keyframes.frames,
     keyframes.yaw_without_moment,
+    contacts,
+    regions,
 )
 """What is asked of every task."""
 ONCE_SOUND: tuple[Check, ...] = (formulation,)

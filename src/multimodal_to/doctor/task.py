@@ -19,6 +19,7 @@ from multimodal_to.ocp.guess import standing_posture
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import Constraint
 from multimodal_to.ocp.waypoints import com as com_path
+from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 from multimodal_to.trajectory import rules
 
@@ -103,9 +104,16 @@ class Task:
         return min(knots, default=None)
 
     @cached_property
+    def lost(self) -> set[int]:
+        """Return the places of the jets that have failed where the motion hovers: by its end, or at its start."""
+        known = [failure for failure in self.scenario.failures if failure.jet in self.robot.jet_names]
+        failing = failing_knots(known, self.robot.jet_names, self.scenario.knots)
+        return {row for row, knot in failing.items() if knot == 0 or "start" not in self.hovers}
+
+    @cached_property
     def thrusts_held(self) -> Array:
-        """Return the greatest thrust that each jet can hold [N], (jets,)."""
-        return np.array([greatest_held(jet) for jet in self.robot.jets])
+        """Return the greatest thrust that each jet can hold [N], (jets,); zero of one that has failed."""
+        return np.array([0.0 if row in self.lost else greatest_held(jet) for row, jet in enumerate(self.robot.jets)])
 
     @property
     def lifts(self) -> bool:

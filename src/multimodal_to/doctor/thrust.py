@@ -8,7 +8,9 @@ import numpy as np
 
 from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
 from multimodal_to.doctor.task import Task
-from multimodal_to.doctor.turbines import spool_up
+from multimodal_to.doctor.turbines import greatest_held, spool_up
+from multimodal_to.errors import ScenarioError
+from multimodal_to.scenarios.failures import failing_knots
 
 _HURRY = 0.8
 """Share of the longest horizon beyond which spooling up leaves little time to move [1]."""
@@ -31,10 +33,35 @@ def weight(task: Task) -> Iterator[Symptom]:
     elif not task.lifts:
         yield error(
             "thrust",
-            f"the robot has to hover at the {when}, but it weighs {robot.weight:.0f} N ({robot.mass:.1f} kg) and its "
-            f"{len(robot.jets)} jets together hold at most {task.thrusts_held.sum():.0f} N",
+            f"the robot has to hover at the {when}, but it weighs {robot.weight:.0f} N ({robot.mass:.1f} kg) and "
+            f"{_count(task)} together hold at most {task.thrusts_held.sum():.0f} N",
             "take a lighter robot or stronger jets, or a start and terminal on the ground",
         )
+
+
+def failures(task: Task) -> Iterator[Symptom]:
+    """Look for jets that fail and are not there, and for a hover at the end that the others cannot hold."""
+    robot, scenario = task.robot, task.scenario
+    try:
+        failing = failing_knots(scenario.failures, robot.jet_names, scenario.knots)
+    except ScenarioError as cause:
+        yield error("failures", str(cause), "name a jet that the scenario uses")
+        return
+    held = sum(greatest_held(jet) for row, jet in enumerate(robot.jets) if row not in failing)
+    if failing and "end" in task.hovers and task.lifts and held < robot.weight:
+        yield error(
+            "failures",
+            f"the motion ends in a hover, the robot weighs {robot.weight:.0f} N, and the jets that have not failed by "
+            f"then hold at most {held:.0f} N",
+            "end on the ground, or let fewer jets fail",
+        )
+
+
+def _count(task: Task) -> str:
+    count = len(task.robot.jets)
+    return (
+        f"its {count} jets" if not task.lost else f"the jets that have not failed, {count - len(task.lost)} of {count},"
+    )
 
 
 def spool_up_time(task: Task) -> Iterator[Symptom]:
@@ -45,7 +72,9 @@ def spool_up_time(task: Task) -> Iterator[Symptom]:
     step, longest = scenario.interval_max, knots * scenario.interval_max
     count = max(scenario.knots, int(_PATIENCE / step))
     times = np.linspace(step, count * step, count)
-    enough = np.flatnonzero(spool_up(robot.jets, times).sum(axis=0) >= robot.weight)
+    enough = np.flatnonzero(
+        spool_up([jet for row, jet in enumerate(robot.jets) if row not in task.lost], times).sum(axis=0) >= robot.weight
+    )
     needed = times[enough[0]] if enough.size else np.inf
     reached = f"the jets need {needed:.1f} s" if enough.size else f"the jets need more than {times[-1]:.0f} s"
     horizon = "the horizon" if knots == scenario.knots else f"the time until the hover at knot {knots}"

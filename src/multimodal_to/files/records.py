@@ -129,7 +129,8 @@ class Records:
         if is_dataclass(kind):
             return self._record(kind, value, key, base)
         if get_origin(kind) is tuple:
-            return self._tuple(get_args(kind), value, key)
+            alone = isinstance(value, str) and get_args(kind) == (str, Ellipsis)
+            return self._tuple(get_args(kind), [value] if alone else value, key)
         if get_origin(kind) is Mapping:
             if not isinstance(value, Mapping):
                 raise self._wrong(key, value, "a table")

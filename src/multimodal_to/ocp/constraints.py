@@ -56,6 +56,11 @@ def heights(knot: Knot, parameters: Parameters) -> SX:
     return cs.vertcat(*(parameters.surface.distance(point) for point in knot.points))
 
 
+def contact_forces(knot: Knot, parameters: Parameters) -> SX:
+    """f_i."""
+    return knot.contact_forces
+
+
 def friction_cone(knot: Knot, parameters: Parameters) -> SX:
     """|t·f| ≤ μ n·f as the scenario's pyramid or cone, which holds n·f ≥ 0 as well (eq. 12, 18, 19)."""
     inside = contact.FRICTION[parameters.scenario.friction_cone]

@@ -16,8 +16,11 @@ from multimodal_to.models.attitude import signed_like
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Surface, heights_below
 from multimodal_to.ocp import waypoints
-from multimodal_to.ocp.gait import steps
+from multimodal_to.ocp.flights import flights, interval, thrown
+from multimodal_to.ocp.gait import footfalls, steps
+from multimodal_to.ocp.schedule import Schedule
 from multimodal_to.ocp.variables import Layout
+from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 
 _CONTACT_TOLERANCE = 1e-6
@@ -138,8 +141,9 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     turns and bends as they ask. The contact points go along in x and y, or step `guess_steps` times; they follow the
     ground, or fly along with a robot that starts in the air. Contact forces carry the weight, unless thrusts do
     (`_weight_flown`); none acts at a point in the air. A motion from the air to the ground comes down in the first
-    `LANDED` of its knots, which leaves the turbines time to slow down. A robot without jets that has to be high
-    at mid-horizon is thrown there. Everything else is zero.
+    `LANDED` of its knots, which leaves the turbines time to slow down. Where contacts are given, feet that are off
+    swing, and the others bear the weight. A robot without jets is thrown where all its feet are off, or where it has to
+    be high at mid-horizon. Everything else is zero.
 
     Args:
         robot: with the jets that the scenario uses.
@@ -149,7 +153,8 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     """
     knots = scenario.knots + 1
     start = np.array(scenario.start_com)
-    travelled = _travelled(scenario)
+    schedule = Schedule.of(robot, scenario)
+    travelled = _travelled(scenario, schedule)
     guess = np.zeros((layout.size, knots))
     view = layout.read(guess)
     view["com_position"][:] = start[:, None] + travelled
@@ -159,24 +164,31 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     view["base_quaternion_xyzw"][:] = signed_like(standing.base_quaternion_xyzw, upright)[:, None]
     view["joint_positions"][:] = standing.joint_positions[:, None]
 
-    flown = _weight_flown(robot, scenario)
+    flown = _weight_flown(robot, scenario, schedule)
     _set_jets(robot, scenario, view, flown)
     feet = [contact.foot for contact in robot.contacts]
-    moved, shares = steps(feet, robot.gait, scenario, travelled) if scenario.guess_steps else _glide(feet, travelled)
+    if schedule.given.any():
+        moved, shares = footfalls(robot, schedule, travelled)
+    else:
+        moved, shares = (
+            steps(feet, robot.gait, scenario, travelled) if scenario.guess_steps else _glide(feet, travelled)
+        )
+    in_air = flights(robot, scenario, schedule, float(view["com_position"][2, scenario.knots // 2]))
+    rise, speed = thrown(robot, scenario, in_air)
+    moved[:, 2] = np.maximum(moved[:, 2], rise)
+    shares = shares * (rise <= 0.0)
     moved = moved + away[:, :1] * _ALONG_GROUND
     stands = contact_positions(robot, standing).reshape(-1, 3, 1)
     points = stands + moved
     points[:, 2] += _ground(scenario, points) - _ground(scenario, stands)
     if scenario.start is not Start.STANDING:
         points[:, 2] = np.maximum(points[:, 2], (stands + away)[:, 2])  # the feet fly along
-    if scenario.mid_height_min is not None and not robot.jets:
-        rise, speed = hop(robot, scenario, view["com_position"][2])
-        for name in ("com_position", "base_position"):
-            view[name][2] += rise
-        for name in ("com_velocity", "base_linear_velocity"):
-            view[name][2] += speed
-        points[:, 2] += rise
-        shares = shares * (rise <= 0.0)
+    along = np.gradient(travelled, interval(scenario), axis=1) * (rise > 0.0)
+    for name in ("com_position", "base_position"):
+        view[name][2] += rise
+    for name in ("com_velocity", "base_linear_velocity"):
+        view[name][:] += along
+        view[name][2] += speed
     if scenario.keyframes:
         points = waypoints.pose(robot, scenario, view, points)
         shares = shares * (points[:, 2] - _ground(scenario, points) < IN_THE_AIR)
@@ -185,48 +197,44 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     return guess
 
 
-def hop(robot: Robot, scenario: Scenario, heights: Array) -> tuple[Array, Array]:
-    """Return how far the robot is above its stance [m], and its speed [m/s], (N + 1,) each: a throw to mid-horizon.
-
-    Args:
-        robot: without jets.
-        scenario: its `mid_height_min` is what the throw reaches.
-        heights: of the CoM while it stands [m], (N + 1,).
-    """
-    middle, interval = scenario.knots // 2, 0.5 * (scenario.interval_min + scenario.interval_max)
-    gravity = float(np.linalg.norm(robot.gravity))
-    times = interval * (np.arange(scenario.knots + 1) - middle)
-    rise = np.maximum((scenario.mid_height_min or 0.0) - heights[middle] - 0.5 * gravity * times**2, 0.0)
-    return rise, np.where(rise > 0.0, -gravity * times, 0.0)
-
-
 def _lands(scenario: Scenario) -> bool:
     """Return whether a motion goes from the air to the ground."""
     return scenario.start is not Start.STANDING and scenario.terminal is Terminal.STANDING
 
 
-def _travelled(scenario: Scenario) -> Array:
-    """Return how far the CoM is from its start at every knot [m], (3, N + 1), by way of the keyframes.
-
-    One that lands is there early.
-    """
-    share = np.linspace(0.0, 1.0, scenario.knots + 1)
+def _travelled(scenario: Scenario, schedule: Schedule) -> Array:
+    """Return how far the CoM is from its start at every knot [m], (3, N + 1), by way of the keyframes."""
     start = np.array(scenario.start_com)
     if not scenario.keyframes_between():
-        progress = np.minimum(share / LANDED, 1.0) if _lands(scenario) else share
-        return np.asarray((np.array(scenario.end_com) - start)[:, None] * progress)
+        return np.asarray((np.array(scenario.end_com) - start)[:, None] * _progress(scenario, schedule))
     return np.asarray(waypoints.com(scenario, early=LANDED if _lands(scenario) else 1.0) - start[:, None])
 
 
-def _weight_flown(robot: Robot, scenario: Scenario) -> Array:
+def _progress(scenario: Scenario, schedule: Schedule) -> Array:
+    """Return which share of the way is behind the robot at every knot, (N + 1,); one that lands is there early.
+
+    Where contacts are given, the robot goes on while a point of it is off.
+    """
+    share = np.linspace(0.0, 1.0, scenario.knots + 1)
+    if (off := schedule.off.any(axis=0)).any():
+        return np.asarray(np.cumsum(off) / off.sum())
+    return np.minimum(share / LANDED, 1.0) if _lands(scenario) else share
+
+
+def _weight_flown(robot: Robot, scenario: Scenario, schedule: Schedule) -> Array:
     """Return the share of the weight that the thrusts carry at every knot, (N + 1,).
 
     All of it for a motion that starts in the air, until it has landed; from there on they hand it over. On a walk into
     the air they take it over. Between keyframes that hover or stand it changes evenly. Otherwise the feet carry it.
+    Where all feet are given to be off, the thrusts do.
     """
-    share = np.linspace(0.0, 1.0, scenario.knots + 1)
     if not robot.jets:
-        return np.zeros_like(share)
+        return np.zeros(scenario.knots + 1)
+    return np.where(schedule.in_air, 1.0, _usually_flown(scenario))
+
+
+def _usually_flown(scenario: Scenario) -> Array:
+    share = np.linspace(0.0, 1.0, scenario.knots + 1)
     if any(one.keyframe.hover or one.keyframe.standing for one in scenario.keyframes_between()):
         return waypoints.flown(scenario)
     if scenario.start is not Start.STANDING:
@@ -241,10 +249,14 @@ def _ground(scenario: Scenario, points: Array) -> Array:
 
 
 def _set_jets(robot: Robot, scenario: Scenario, view: dict[str, Array], flown: Array) -> None:
-    """Let all jets push alike, as much as their limits allow."""
+    """Let all jets that have not failed push alike, as much as their limits allow."""
     interval = 0.5 * (scenario.interval_min + scenario.interval_max)
+    works = np.ones((len(robot.jets), scenario.knots + 1))
+    for row, knot in failing_knots(scenario.failures, robot.jet_names, scenario.knots).items():
+        works[row, knot:] = 0.0
+    shares = works / np.maximum(works.sum(axis=0), 1.0)
     for index, jet in enumerate(robot.jets):
-        thrust = np.minimum(flown * robot.weight / len(robot.jets), jet.thrust_max)
+        thrust = np.minimum(flown * robot.weight * shares[index], jet.thrust_max)
         throttle = [jet.model.steady_throttle(value) for value in thrust]
         view["thrust"][index] = thrust
         view["thrust_rate"][index, 1:] = np.diff(thrust) / interval

@@ -20,10 +20,11 @@ from multimodal_to.models.joint_units import joint_units
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.state import State
 from multimodal_to.ocp import constraints, given
+from multimodal_to.ocp.contacts import ON_GROUND
 from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
-from multimodal_to.ocp.paper import ON_GROUND, UPRIGHT, UPRIGHT_FIRST, each
+from multimodal_to.ocp.paper import UPRIGHT, UPRIGHT_FIRST, each
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import (
     Constraint,
@@ -40,6 +41,7 @@ from multimodal_to.ocp.terms import (
     equal,
 )
 from multimodal_to.ocp.variables import Bounds
+from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.keyframes import AXES, Placed, Vector3, by_axis
 from multimodal_to.scenarios.scenario import Scenario, Start
 from multimodal_to.trajectory import rules
@@ -69,7 +71,7 @@ def hold(
         _set_start(bounds, robot, scenario, standing)
     for one in scenario.placed():
         if one.knot and one.keyframe.still:
-            _still(bounds, scenario, one, rule)
+            _still(bounds, robot, scenario, one, rule)
 
 
 def _set_start(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Posture) -> None:
@@ -89,11 +91,18 @@ def _set_start(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Postu
     fix("throttle", 0, np.array(idle))
 
 
-def _still(bounds: Bounds, scenario: Scenario, one: Placed, rule: str) -> None:
+def _still(bounds: Bounds, robot: Robot, scenario: Scenario, one: Placed, rule: str) -> None:
     """Let nothing move at a later knot; in a hover and standing the forces balance too.
 
     Velocities of base and joints hold the CoM's velocity and the angular momentum as well. These at a neighbour of the
     knot make the accelerations there zero: of the last knot at the one before, over the last interval.
+
+    Args:
+        bounds: of every variable at every knot; they are changed.
+        robot: with the jets that the scenario uses.
+        scenario: the task.
+        one: the keyframe.
+        rule: name of the integration rule.
     """
     fix, knot, between_knots = bounds.fix, one.knot, bool(rules.instant(rule, "com_velocity"))
     for name in _AT_REST:
@@ -105,8 +114,10 @@ def _still(bounds: Bounds, scenario: Scenario, one: Placed, rule: str) -> None:
     for name in ("com_velocity", "angular_momentum"):
         fix(name, neighbour, 0.0)
     if one.keyframe.hover:
+        failed = failing_knots(scenario.failures, robot.jet_names, scenario.knots)
         for at in (neighbour, knot):
-            fix("thrust_rate", at, 0.0)
+            running = [row for row in range(len(robot.jets)) if not 0 < failed.get(row, 0) <= at]
+            fix("thrust_rate", at, 0.0, rows=running)  # one that has failed is still running down
         # Where velocities are between knots, the forces of the knot before the last one make the last velocity.
         for at in (neighbour, knot) if between_knots and last else (knot,):
             fix("contact_forces", at, 0.0, within=given.NO_FORCE)

@@ -19,7 +19,7 @@ from multimodal_to.models import contact
 from multimodal_to.models.centroidal import thrust_force
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.sole import PRESSURE_SLACK, soles
-from multimodal_to.ocp import constraints, costs, paper
+from multimodal_to.ocp import constraints, contacts, costs, paper
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
@@ -164,6 +164,7 @@ CENTRE_OF_PRESSURE = Constraint(
     scale=0.01,
     labels=_edges,
     when=_asked("pressure"),
+    present=contacts.loaded_edges,
 )
 TOUCH_DOWN = Constraint(
     value=touch_down,
@@ -173,6 +174,7 @@ TOUCH_DOWN = Constraint(
     scale=0.1,
     labels=_contact_names,
     when=_asked("touch_down_speed"),
+    present=contacts.not_on,
 )
 
 LINK_DISTANCES = Constraint(

@@ -14,6 +14,7 @@ from multimodal_to.ocp.guess import standing_posture
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.stages import Held, NamedStage, collect
 from multimodal_to.ocp.variables import Bounds, Layout, ranges
+from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 
 
@@ -82,7 +83,7 @@ def formulate(
     layout = Layout.of(robot, formulation.variables)
     box = ranges(robot, scenario, layout)
     bounds = box.copy()
-    parameters = Parameters.of(robot, scenario, standing, _target(robot, scenario, standing))
+    parameters = Parameters.of(robot, scenario, standing, _target(robot, scenario, standing), formulation.rule.name)
     given.check(robot, scenario, initial)
     more = keyframes.terms(robot, scenario, formulation.rule.name)
     stages, held = collect(formulation.with_terms(*more), parameters, layout, bounds)
@@ -127,6 +128,7 @@ def prepared(robot: Robot, scenario: Scenario) -> tuple[Robot, Posture]:
         robot = robot.with_jets(())
     if not robot.contacts:
         raise ScenarioError(f"{robot.name} has no contact points to stand on")
+    failing_knots(scenario.failures, robot.jet_names, scenario.knots)  # which refuses a jet that is not there
     for group in scenario.weights.joint_velocities:
         robot.group_indices(group)
     return robot, _standing(robot, scenario)

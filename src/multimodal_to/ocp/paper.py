@@ -12,7 +12,8 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.contact import FACES
-from multimodal_to.ocp import constraints, costs
+from multimodal_to.ocp import constraints, contacts, costs, failures, regions
+from multimodal_to.ocp.contacts import ON_GROUND
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import (
     Constraint,
@@ -30,9 +31,6 @@ from multimodal_to.ocp.terms import (
 )
 from multimodal_to.scenarios.scenario import Start, Terminal
 from multimodal_to.trajectory.quantities import TWIST, XYZ, XYZW, row_labels
-
-ON_GROUND = 1e-5
-"""Largest height of a contact point that stands [m]: a sole has more corners than a plane needs."""
 
 UPRIGHT = 1e-3
 """How far each part of the base's quaternion, from upright, may be off in a hover [1]: 2e-3 rad about each axis."""
@@ -153,6 +151,7 @@ NON_PENETRATION = Constraint(
     unit="m",
     labels=each("contact"),
     rigid=True,
+    present=contacts.not_held,
 )
 FRICTION_CONE = Constraint(
     value=constraints.friction_cone,
@@ -161,6 +160,7 @@ FRICTION_CONE = Constraint(
     holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
     scale=FORCE,
     labels=_faces,
+    present=contacts.loaded_faces,
 )
 COMPLEMENTARITY = Constraint(
     value=constraints.complementarity,
@@ -168,6 +168,7 @@ COMPLEMENTARITY = Constraint(
     unit="N m",
     holds=Where.LATER_KNOTS,
     labels=each("contact"),
+    present=contacts.found_at_knot,
 )
 CONTACT_REACH = Constraint(
     value=constraints.contact_reach,
@@ -250,6 +251,7 @@ SLIDING = Constraint(
     unit="N m",
     holds=Where.EVERY_INTERVAL,
     labels=each("contact", "x", "y"),
+    present=contacts.slides_before,
 )
 STANDING_HEIGHT = Constraint(
     name="standing_height",
@@ -260,6 +262,7 @@ STANDING_HEIGHT = Constraint(
     labels=each("contact"),
     when=_stands_last,
     rigid=True,
+    present=contacts.not_held,
 )
 
 COMPLEMENTARITY_BEFORE = Constraint(
@@ -268,11 +271,15 @@ COMPLEMENTARITY_BEFORE = Constraint(
     unit="N m",
     holds=Where.EVERY_INTERVAL,
     labels=each("contact"),
+    present=contacts.found_before,
 )
 COMPLEMENTARITY_AFTER = replace(
-    COMPLEMENTARITY_BEFORE, name="complementarity_after", value=constraints.complementarity_after
+    COMPLEMENTARITY_BEFORE,
+    name="complementarity_after",
+    value=constraints.complementarity_after,
+    present=contacts.found_after,
 )
-SLIDING_AFTER = replace(SLIDING, name="sliding_after", value=constraints.sliding_after)
+SLIDING_AFTER = replace(SLIDING, name="sliding_after", value=constraints.sliding_after, present=contacts.slides_after)
 FINAL_EQUILIBRIUM = Constraint(
     name="final_equilibrium",
     value=constraints.static_equilibrium,
@@ -292,6 +299,7 @@ FINAL_STEADY_THRUST = Constraint(
     scale=FORCE,
     labels=each("jet"),
     when=_hovers_last,
+    present=failures.running,
 )
 MOMENTUM_AT_START = Constraint(
     value=constraints.momentum_at_start,
@@ -364,6 +372,9 @@ CONSTRAINTS = (
     THRUST_DYNAMICS,
     SLIDING,
     STANDING_HEIGHT,
+    *contacts.CONSTRAINTS,
+    *failures.CONSTRAINTS,
+    regions.ROOM,
 )
 
 # -------------------------------------------------------------------- costs

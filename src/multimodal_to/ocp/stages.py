@@ -61,6 +61,20 @@ class _Place:
     knots: NDArray[np.int64]  # that its knot rows are of
 
 
+def _by_presence(rows: Rows, place: _Place) -> Iterator[tuple[_Place, Rows]]:
+    """Split rows by the knots at which they are: each part of a place with the rows that are at all of its knots."""
+    if rows.present is None:
+        yield place, rows
+        return
+    groups = dict[bytes, list[int]]()
+    for index, here in enumerate(rows.present[:, place.knots]):
+        groups.setdefault(here.tobytes(), []).append(index)
+    for some in groups.values():
+        here = rows.present[some[0], place.knots]
+        if here.any():
+            yield replace(place, starts=place.starts[here], knots=place.knots[here]), rows.of(some)
+
+
 def collect(
     formulation: Formulation, parameters: Parameters, layout: Layout, bounds: Bounds
 ) -> tuple[list[NamedStage], list[Held]]:
@@ -115,32 +129,35 @@ def collect(
     )
     stages, held = list[NamedStage](), list[Held]()
     for place in (*places, *_chosen(formulation.terms, places[0], places[2], interval, knots)):
-        rows = list[tuple[str, Rows]]()
+        parts = {place.knots.tobytes(): (place, list[tuple[str, Rows]]())}
         for name, some in _rows(formulation.constraints, place, parameters):
-            left, bound = _without_bounds(name, some, place, layout)
-            held += bound
-            if left.expression.shape[0]:
-                rows.append((name, left))
+            for part, here in _by_presence(some, place):
+                left, bound = _without_bounds(name, here, part, layout)
+                held += bound
+                if left.expression.shape[0]:
+                    parts.setdefault(part.knots.tobytes(), (part, []))[1].append((name, left))
         charged = _charges(formulation.costs, place, parameters, duration)
-        if not (rows or charged):
-            continue
-        stages.append(
-            NamedStage(
-                stage=Stage(
-                    name=place.name,
-                    starts=place.starts,
-                    start=z,
-                    end=z_next,
-                    interval=dt,
-                    lifted_families=tuple(some.expression / some.scale for _, some in rows),
-                    lifted_costs=cs.vertcat(cs.SX(0, 1), *charged.values()),
-                    lifted=lifted,
-                ),
-                rows=rows,
-                knots=place.knots,
-                cost_names=tuple(charged),
+        for index, (part, rows) in enumerate(parts.values()):
+            costs = {} if index else charged
+            if not (rows or costs):
+                continue
+            stages.append(
+                NamedStage(
+                    stage=Stage(
+                        name=f"{place.name}_{index}" if index else place.name,
+                        starts=part.starts,
+                        start=z,
+                        end=z_next,
+                        interval=dt,
+                        lifted_families=tuple(some.expression / some.scale for _, some in rows),
+                        lifted_costs=cs.vertcat(cs.SX(0, 1), *costs.values()),
+                        lifted=lifted,
+                    ),
+                    rows=rows,
+                    knots=part.knots,
+                    cost_names=tuple(costs),
+                )
             )
-        )
     for some_bound in held:
         _tighten(bounds, layout, some_bound)
     return stages, held
@@ -234,13 +251,7 @@ def _without_bounds(name: str, rows: Rows, place: _Place, layout: Layout) -> tup
         )
     if not held:
         return rows, held
-    left = replace(
-        rows,
-        expression=cs.vertcat(cs.SX(0, 1), *(rows.expression[index] for index in kept)),
-        units=tuple(rows.units[index] for index in kept),
-        components=tuple(rows.components[index] for index in kept),
-    )
-    return left, held
+    return rows.of(kept), held
 
 
 def _tighten(bounds: Bounds, layout: Layout, held: Held) -> None:

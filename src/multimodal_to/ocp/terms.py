@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
 import casadi as cs
 import numpy as np
+from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import SX, Array
 from multimodal_to.arguments import check_fields, checked
@@ -30,6 +31,10 @@ Limit = float | Callable[[Parameters], float]
 """A number, or a function of the parameters for one that the robot or the scenario says."""
 Labels = tuple[str, ...] | Callable[[Parameters], tuple[str, ...]]
 """The names of a term's rows, or a function of the parameters where the robot says how many there are."""
+
+
+Present = Callable[[Parameters], NDArray[np.bool_]]
+"""Which rows of a term there are at which knot, (rows, N + 1); of intervals, column k is of the one that ends at k."""
 
 
 Units = str | tuple[str, ...] | Callable[[Parameters], tuple[str, ...]]
@@ -195,6 +200,17 @@ class Rows:
     units: tuple[str, ...]  # of each row
     scale: float  # the size that the solver sees as one
     components: tuple[str, ...]  # the name of each row among them
+    present: NDArray[np.bool_] | None = None  # at which knots each row is, (m, N + 1); None: at all of its place
+
+    def of(self, kept: Sequence[int]) -> Rows:
+        """Return some of the rows, in this order."""
+        return replace(
+            self,
+            expression=cs.vertcat(cs.SX(0, 1), *(self.expression[index] for index in kept)),
+            units=tuple(self.units[index] for index in kept),
+            components=tuple(self.components[index] for index in kept),
+            present=None if self.present is None else self.present[list(kept)],
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,6 +227,7 @@ class Constraint:
         labels: names of the rows, as `("x", "y", "z")`; by default their numbers.
         when: for which problems the constraint exists; by default for all.
         rigid: `relax` does not let the rows give way unless it is told to.
+        present: which of its rows exist at which of the knots where it holds; by default all.
 
     Raises:
         FormulationError: something of this is not what it should be.
@@ -225,6 +242,7 @@ class Constraint:
     labels: Labels = ()
     when: Callable[[Parameters], bool] | None = None
     rigid: bool = False
+    present: Present | None = None
 
     def __post_init__(self) -> None:
         _complete(self, self.value, "holds")
@@ -265,8 +283,27 @@ class Constraint:
             if len(given) != count:
                 raise _wrong(self.name, f"there are {len(given)} {kind} for {count} rows", "one for each row")
         return Rows(
-            expression=expression, lower=lower, upper=upper, units=units, scale=self.scale, components=tuple(labels)
+            expression=expression,
+            lower=lower,
+            upper=upper,
+            units=units,
+            scale=self.scale,
+            components=tuple(labels),
+            present=None if self.present is None else self._present(count, parameters),
         )
+
+    def _present(self, count: int, parameters: Parameters) -> NDArray[np.bool_]:
+        """Return which rows there are at which knots, (count, N + 1)."""
+        assert self.present is not None
+        present = np.asarray(_asked(self.name, "presence", self.present, parameters))
+        shape = count, parameters.scenario.knots + 1
+        if present.dtype != np.bool_ or present.shape != shape:
+            raise _wrong(
+                self.name,
+                f"'present' returns {present.dtype} of shape {present.shape}",
+                f"True or False for each row at each knot, {shape}",
+            )
+        return present
 
 
 @dataclass(frozen=True, kw_only=True)

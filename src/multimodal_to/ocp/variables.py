@@ -107,7 +107,9 @@ class Bounds:
         """Return bounds that can change on their own."""
         return Bounds(*({name: side[name].copy() for name in side} for side in (self.lower, self.upper)))
 
-    def fix(self, name: str, knot: int, value: Array | float, within: float = 0.0) -> None:
+    def fix(
+        self, name: str, knot: int, value: Array | float, within: float = 0.0, rows: Sequence[int] | None = None
+    ) -> None:
         """Hold a variable at a value at one knot.
 
         Args:
@@ -115,12 +117,14 @@ class Bounds:
             knot: which knot.
             value: in the variable's unit, (dim,) or one number for all of its rows.
             within: how far from the value it may be, in the same unit.
+            rows: which of its rows are held; by default all.
 
         Raises:
             ScenarioError: its range does not allow that value.
         """
-        target = np.broadcast_to(np.asarray(value, dtype=float), self.lower[name][:, knot].shape)
-        low, high = self.lower[name][:, knot], self.upper[name][:, knot]
+        some = slice(None) if rows is None else list(rows)
+        low, high = self.lower[name][some, knot], self.upper[name][some, knot]
+        target = np.broadcast_to(np.asarray(value, dtype=float), low.shape)
         if bad := np.flatnonzero((target < low - 1e-9) | (target > high + 1e-9)).tolist():
             quantity = QUANTITIES[name]
             unit = either(quantity.unit) if quantity.of == "joint" else quantity.unit
@@ -128,8 +132,8 @@ class Bounds:
                 f"{name}[{bad[0]}] has to be {target[bad[0]]:.6g} at knot {knot}, outside its range "
                 f"{low[bad[0]]:.6g} to {high[bad[0]]:.6g} {unit}"
             )
-        self.lower[name][:, knot] = np.clip(target - within, low, high)
-        self.upper[name][:, knot] = np.clip(target + within, low, high)
+        self.lower[name][some, knot] = np.clip(target - within, low, high)
+        self.upper[name][some, knot] = np.clip(target + within, low, high)
 
 
 def ranges(robot: Robot, scenario: Scenario, layout: Layout) -> Bounds:

@@ -11,18 +11,29 @@ from multimodal_to.scenarios.bundled import (
     take_off_and_landing,
     walk_to_fly,
 )
+from multimodal_to.scenarios.contacts import ContactState, ContactStretch
+from multimodal_to.scenarios.failures import JetFailure
+from multimodal_to.scenarios.gaits import GaitKind, GaitPlan
 from multimodal_to.scenarios.keyframes import FrameTarget, Keyframe, Momentum
+from multimodal_to.scenarios.regions import Box, Wall
 from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
 
 __all__ = [
     "SCENARIOS",
+    "Box",
+    "ContactState",
+    "ContactStretch",
     "FrameTarget",
+    "GaitKind",
+    "GaitPlan",
+    "JetFailure",
     "Keyframe",
     "Margins",
     "Momentum",
     "Scenario",
     "Start",
     "Terminal",
+    "Wall",
     "Weights",
     "find",
     "jump",

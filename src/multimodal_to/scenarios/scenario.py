@@ -14,6 +14,9 @@ from multimodal_to.errors import ScenarioError, listed, shown
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Surface, heights_below
+from multimodal_to.scenarios.contacts import ContactStretch
+from multimodal_to.scenarios.failures import JetFailure
+from multimodal_to.scenarios.gaits import GaitPlan
 from multimodal_to.scenarios.keyframes import (
     AXES,
     END,
@@ -25,6 +28,7 @@ from multimodal_to.scenarios.keyframes import (
     by_axis,
     contradiction,
 )
+from multimodal_to.scenarios.regions import Box, Wall
 from multimodal_to.values import FrozenMapping
 
 Vector3 = tuple[float, float, float]
@@ -221,11 +225,23 @@ class Scenario:
     """Limits of the audit's properties by name, where they are wider than the audit's own [the property's own]."""
     guess_steps: int = 0
     """How many steps the feet take in the start guess, in turns [1]; with 0 they glide along with the CoM."""
+    contacts: tuple[ContactStretch, ...] = ()
+    """Which feet stand and which are in the air, over which stretches; what is not given is found."""
+    gait: GaitPlan | None = None
+    """Steps in a pattern, which give every foot; what `contacts` says beside it holds instead."""
+    failures: tuple[JetFailure, ...] = ()
+    """Jets that fail, and when."""
+    walls: tuple[Wall, ...] = ()
+    """Half-spaces that the robot stays in."""
+    boxes: tuple[Box, ...] = ()
+    """Boxes that the robot keeps out of, or stays in."""
 
     def __post_init__(self) -> None:
         check_fields(self, ScenarioError)
         object.__setattr__(self, "allowances", FrozenMapping(self.allowances))
         object.__setattr__(self, "keyframes", tuple(self.keyframes))
+        for label in ("contacts", "failures", "walls", "boxes"):
+            object.__setattr__(self, label, tuple(getattr(self, label)))
         self._check_name()
         self._check_numbers()
         self._take_ends()

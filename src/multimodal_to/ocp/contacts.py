@@ -1,0 +1,261 @@
+"""The terms of contacts that a scenario gives, and where those of contacts that are found are left out.
+
+A force that is given to be zero is a bound, and so is the height of a point that is given to stand on flat ground.
+"""
+
+from __future__ import annotations
+
+import casadi as cs
+import numpy as np
+
+from multimodal_to.adam.spatial import SX
+from multimodal_to.models.contact import FACES
+from multimodal_to.models.sole import soles
+from multimodal_to.ocp import constraints
+from multimodal_to.ocp.integration import Interval
+from multimodal_to.ocp.knot import Knot
+from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.ocp.schedule import Flags
+from multimodal_to.ocp.terms import Constraint, Where, at_least, equal
+from multimodal_to.trajectory.quantities import XYZ, row_labels
+
+ON_GROUND = 1e-5
+"""Largest height of a contact point that stands [m]: a sole has more corners than a plane needs."""
+_LINE = 1e-3
+"""Points nearer to a line than this share of its length do not hold a body from turning about it [1]."""
+
+# -------------------------------------------------------------------- which rows there are
+
+
+def not_held(parameters: Parameters) -> Flags:
+    """Return at which knots the height of a point is not given."""
+    return ~held(parameters)
+
+
+def held(parameters: Parameters) -> Flags:
+    """Return at which knots the height of a point is given: of each body that stands, of as many as hold it.
+
+    Three points that are not on one line hold a sole. The heights of its others follow from theirs.
+    """
+    flags = np.zeros_like(parameters.contacts.stands)
+    for members, here in _bodies(parameters, parameters.contacts.stands):
+        flags[_supports(parameters, members)] |= here
+    return flags
+
+
+def _bodies(parameters: Parameters, flags: Flags) -> list[tuple[list[int], Flags]]:
+    """Return every set of points of one body that is flagged at some knots, and at which knots it is that set.
+
+    Args:
+        parameters: with the robot.
+        flags: of each point at each knot, (contacts, N + 1).
+    """
+    robot, found = parameters.robot, list[tuple[list[int], Flags]]()
+    bodies = [robot.kindyn.tree.frame(name).body for name in robot.contact_names]
+    for body in dict.fromkeys(bodies):
+        members = np.flatnonzero([other == body for other in bodies])
+        for some in np.unique(flags[members], axis=1).T:
+            if some.any():
+                found.append((members[some].tolist(), (flags[members] == some[:, None]).all(axis=0)))
+    return found
+
+
+def _supports(parameters: Parameters, members: list[int]) -> list[int]:
+    """Return up to three of the points of a body that are far from each other and not on one line."""
+    robot = parameters.robot
+    frames = [robot.kindyn.tree.frame(robot.contact_names[index]) for index in members]
+    places = np.array([np.array(cs.DM(frame.translation)).ravel() for frame in frames])
+    away = np.linalg.norm(places - places[0], axis=1)
+    second = int(away.argmax())
+    if not away[second]:
+        return members[:1]
+    along = (places[second] - places[0]) / away[second]
+    off = np.linalg.norm(np.cross(places - places[0], along), axis=1)
+    third = int(off.argmax())
+    chosen = [0, second, third] if off[third] > _LINE * away[second] else [0, second]
+    return [members[index] for index in chosen]
+
+
+def not_on(parameters: Parameters) -> Flags:
+    """Return over which intervals a point is not given to be on."""
+    return ~parameters.contacts.on
+
+
+def loaded_faces(parameters: Parameters) -> Flags:
+    """Return at which knots a point may bear a force, for each face of its cone."""
+    faces = len(FACES[parameters.scenario.friction_cone])
+    return np.repeat(~parameters.contacts.unloaded, faces, axis=0)
+
+
+def loaded_edges(parameters: Parameters) -> Flags:
+    """Return at which knots a sole may bear a force, for each of its edges."""
+    loaded = ~parameters.contacts.unloaded
+    rows = [loaded[list(sole.members)].any(axis=0) for sole in soles(parameters.robot) for _ in sole.edges]
+    return np.array(rows, dtype=bool).reshape(-1, loaded.shape[1])
+
+
+def found_at_knot(parameters: Parameters) -> Flags:
+    """Return at which knots neither height nor force is given to be zero."""
+    schedule = parameters.contacts
+    return ~(schedule.unloaded | schedule.stands)
+
+
+def found_before(parameters: Parameters) -> Flags:
+    """Return over which intervals neither the height at the start nor the force at the end is given to be zero."""
+    schedule = parameters.contacts
+    return ~(schedule.unloaded | _at_start(schedule.stands))
+
+
+def found_after(parameters: Parameters) -> Flags:
+    """Return over which intervals neither the height at the end nor the force at the start is given to be zero."""
+    schedule = parameters.contacts
+    return ~(_at_start(schedule.unloaded) | schedule.stands)
+
+
+def slides_before(parameters: Parameters) -> Flags:
+    """Return over which intervals neither the slip nor the force at the end is given to be zero, twice for each."""
+    schedule = parameters.contacts
+    return np.repeat(~(schedule.unloaded | schedule.on), 2, axis=0)
+
+
+def slides_after(parameters: Parameters) -> Flags:
+    """Return over which intervals neither the slip nor the force at the start is given to be zero, twice for each."""
+    schedule = parameters.contacts
+    return np.repeat(~(_at_start(schedule.unloaded) | schedule.on), 2, axis=0)
+
+
+def _at_start(flags: Flags) -> Flags:
+    """Return flags of knots, (contacts, N + 1), of the knot before."""
+    return np.hstack([flags[:, :1], flags[:, :-1]])
+
+
+# -------------------------------------------------------------------- what is given
+
+
+def clearance(knot: Knot, parameters: Parameters) -> SX:
+    """d(p_i) less the clearance that is asked for."""
+    rows = [parameters.surface.distance(knot.points[point]) - least for point, least in _clearances(parameters)]
+    return cs.vertcat(cs.SX(0, 1), *rows)
+
+
+def _clearances(parameters: Parameters) -> list[tuple[int, float]]:
+    """Return the contact points with each clearance [m] that is asked of them."""
+    asked = parameters.contacts.clearance
+    return [
+        (int(point), float(least)) for point in range(len(asked)) for least in np.unique(asked[point][asked[point] > 0])
+    ]
+
+
+def _asked_clearance(parameters: Parameters) -> Flags:
+    asked = parameters.contacts.clearance
+    rows = [asked[point] == least for point, least in _clearances(parameters)]
+    return np.array(rows, dtype=bool).reshape(-1, asked.shape[1])
+
+
+def _clearance_labels(parameters: Parameters) -> tuple[str, ...]:
+    names = parameters.robot.contact_names
+    return tuple(f"{names[point]} {least:g} m" for point, least in _clearances(parameters))
+
+
+def _unloaded(parameters: Parameters) -> Flags:
+    return np.repeat(parameters.contacts.unloaded, 3, axis=0)
+
+
+def in_place(interval: Interval, parameters: Parameters) -> SX:
+    """How far each body that stands moves along the ground over the interval, and how far it turns about the vertical.
+
+    For the points of a body, with their mean p̄: the mean of t·(p_i⁺ − p_i) and, of two points or more,
+    n·Σ (p_i − p̄) × (p_i⁺ − p_i) / √Σ |p_i − p̄|².
+    """
+    rows = list[SX]()
+    for members, _ in _bodies(parameters, parameters.contacts.on):
+        before = [interval.start.points[index] for index in members]
+        after = [interval.end.points[index] for index in members]
+        moves = [one - other for one, other in zip(after, before, strict=True)]
+        tangents = [parameters.surface.tangents(point) for point in after]
+        rows.append(sum(part.T @ move for part, move in zip(tangents, moves, strict=True)) / len(members))
+        if len(members) > 1:
+            normal, middle = parameters.surface.normal(after[0]), sum(before) / len(members)
+            arms = [point - middle for point in before]
+            turn = sum(cs.cross(arm, move) for arm, move in zip(arms, moves, strict=True))
+            rows.append(cs.dot(normal, turn) / _spread(parameters, members))
+    return cs.vertcat(cs.SX(0, 1), *rows)
+
+
+def _spread(parameters: Parameters, members: list[int]) -> float:
+    """Return √Σ |p_i − p̄|² of some points of a body [m]."""
+    frames = [parameters.robot.kindyn.tree.frame(parameters.robot.contact_names[index]) for index in members]
+    places = np.array([np.array(cs.DM(frame.translation)).ravel() for frame in frames])
+    return float(np.linalg.norm(places - places.mean(axis=0)))
+
+
+def _in_place(parameters: Parameters) -> Flags:
+    rows = [
+        here
+        for members, here in _bodies(parameters, parameters.contacts.on)
+        for _ in range(3 if len(members) > 1 else 2)
+    ]
+    return np.array(rows, dtype=bool).reshape(-1, parameters.scenario.knots + 1)
+
+
+def _in_place_labels(parameters: Parameters) -> tuple[str, ...]:
+    names, labels = parameters.robot.contact_names, list[str]()
+    for members, _ in _bodies(parameters, parameters.contacts.on):
+        body = ", ".join(names[index] for index in members)
+        labels += [f"{body} {axis}" for axis in (("x", "y", "turn") if len(members) > 1 else ("x", "y"))]
+    return tuple(labels)
+
+
+def _names(parameters: Parameters) -> tuple[str, ...]:
+    return row_labels(parameters.robot, "contact", ("",))
+
+
+def _by_axis(parameters: Parameters) -> tuple[str, ...]:
+    return row_labels(parameters.robot, "contact", XYZ)
+
+
+def _gives(parameters: Parameters) -> bool:
+    return bool(parameters.scenario.contacts or parameters.scenario.gait)
+
+
+GIVEN_OFF = Constraint(
+    name="given_off",
+    value=constraints.contact_forces,
+    within=equal(),
+    unit="N",
+    holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
+    scale=50.0,
+    labels=_by_axis,
+    when=_gives,
+    present=_unloaded,
+)
+GIVEN_ON = Constraint(
+    name="given_on",
+    value=constraints.heights,
+    within=equal(0.5 * ON_GROUND),  # so that the other corners of a sole are in the middle of their range
+    unit="m",
+    labels=_names,
+    when=_gives,
+    rigid=True,
+    present=held,
+)
+GIVEN_IN_PLACE = Constraint(
+    name="given_in_place",
+    value=in_place,
+    within=equal(),
+    unit="m",
+    holds=Where.EVERY_INTERVAL,
+    labels=_in_place_labels,
+    when=_gives,
+    present=_in_place,
+)
+CLEARANCE = Constraint(
+    value=clearance,
+    within=at_least(0.0),
+    unit="m",
+    labels=_clearance_labels,
+    when=_gives,
+    present=_asked_clearance,
+)
+CONSTRAINTS = (GIVEN_OFF, GIVEN_ON, GIVEN_IN_PLACE, CLEARANCE)
+"""What contacts that a scenario gives ask for; without any there are none of their rows."""
