@@ -1,7 +1,7 @@
 """Draw the pictures of the README and set its table of results: python docs/make_pictures.py.
 
-Both come from what `multimodal-to reproduce` wrote to results/. The README has the first of its two tables, with its
-note; docs/results.md has both. Needs Chromium (`apt-get install chromium`), which takes the snapshots, and
+Both come from what `multimodal-to reproduce` and the examples from 11 on wrote to results/. The README has the first of
+its two tables, with its note; docs/results.md has both. Needs Chromium (`apt-get install chromium`), which takes the snapshots, and
 icub-models (`pip install '.[meshes]'`).
 """
 
@@ -39,6 +39,10 @@ def main() -> None:
             write_snapshots(robot, trajectory, ROOT / "docs" / "take-off.png")
     for name in mt.scenarios.SCENARIOS:
         draw_snapshots(robot, mt.Trajectory.load(RESULTS / name / "trajectory.npz"), name)
+    for name in ("sidesteps", "failed-jet", "jump-onto-box"):  # of the examples
+        draw_snapshots(robot, mt.Trajectory.load(RESULTS / name / "trajectory.npz"), name)
+    trot = RESULTS / "trot"
+    draw_snapshots(mt.load_robot(trot / "solo12"), mt.Trajectory.load(trot / "trajectory.npz"), "trot")
     tables = (RESULTS / "table.md").read_text(encoding="utf-8")
     set_table(ROOT / "docs" / "results.md", tables)
     set_table(ROOT / "README.md", "\n\n".join(tables.split("\n\n")[:2]) + "\n")
