@@ -43,6 +43,7 @@ from multimodal_to.models.robot import bundled_robots
 from multimodal_to.models.terrain import HeightField, Plane, Stairs
 from multimodal_to.replay.dress import read_dress
 from multimodal_to.replay.visuals import appearance
+from multimodal_to.scenarios import Box, ContactState, ContactStretch, GaitKind, GaitPlan, JetFailure, Wall
 from multimodal_to.scenarios.data import stored, to_json
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 from multimodal_to.trajectory.importing import import_arrays
@@ -471,6 +472,16 @@ def sources(kind: str, folder: Path) -> list[Source]:
             replace(scenarios.take_off(), surface=surface)
             for surface in (field_, Plane(slope=0.1), Stairs(edges=(0.1,), heights=(0.0, 0.1)))
         ]
+        tasks.append(
+            replace(
+                scenarios.take_off(),
+                contacts=(ContactStretch(of=("left", "right"), state=ContactState.OFF, begin=0.8, clearance=0.01),),
+                gait=GaitPlan(kind=GaitKind.WALK, steps=4, first="left", clearance=0.02),
+                failures=(JetFailure(jet="left arm", at=0.5),),
+                walls=(Wall(normal=(0.0, 0.0, -1.0), offset=-1.5, of=("head",)),),
+                boxes=(Box(lower=(0.0, 0.0, 0.0), upper=(1.0, 1.0, 1.0), begin=0.5),),
+            )
+        )
         short = b'based_on = "take-off"\nfinal_com_height = 0.8\nweights.thrust = 3\nsurface = "flat"\n'
         texts = [scenario_files.to_toml(task).encode() for task in tasks] + [short, KEYFRAMES.encode()]
         return [

@@ -17,7 +17,11 @@ from multimodal_to.replay import write_snapshots
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "results"
 HEIGHT, COLOURS = 400, 256  # of the snapshots of each scenario
-OF_EXAMPLES = {"turn": "ironcub", "reach": "ironcub", "slope": "ironcub", "side-step": ROOT / "examples" / "hopper"}
+OF_EXAMPLES = {
+    **dict.fromkeys(("turn", "reach", "slope", "sidesteps", "failed-jet", "jump-onto-box"), "ironcub"),
+    "side-step": ROOT / "examples" / "hopper",
+    "trot": RESULTS / "trot" / "solo12",
+}
 """The robots of the examples that have a picture, by what their results are called."""
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
 

@@ -38,9 +38,9 @@ def a_jet_has_failed(printed, trajectory):
 
 ALSO = {
     "07_own_scenario": an_own_scenario_is_met,
-    "11_trot": it_trots,
-    "12_sidesteps": it_steps_aside,
-    "13_failed_jet": a_jet_has_failed,
+    "15_trot": it_trots,
+    "16_sidesteps": it_steps_aside,
+    "17_failed_jet": a_jet_has_failed,
 }
 """What else an example shows; in the same test, since another would wait until the example has run."""
 

@@ -190,6 +190,36 @@ BROKEN = {
     "a state that is not there": toml(
         "based_on = 'take-off'\nstart = 'given'\ninitial_state = 'nowhere.npz'", "nowhere.npz", error=None
     ),
+    "contacts without a state": toml(
+        "based_on = 'take-off'\n[[contacts]]\nof = 'left'", "the scenario lacks 'contacts[0].state'"
+    ),
+    "contacts of an unknown state": toml(
+        "based_on = 'take-off'\n[[contacts]]\nof = 'left'\nstate = 'up'", "'contacts[0].state' is 'up'", "on, off, free"
+    ),
+    "contacts of a foot that is not there": toml(
+        "based_on = 'take-off'\n[[contacts]]\nof = 'tail'\nstate = 'on'",
+        "unknown foot or contact point 'tail'",
+        error=None,
+    ),
+    "contacts that run backwards": toml(
+        "based_on = 'take-off'\n[[contacts]]\nof = 'left'\nstate = 'on'\nbegin = 0.6\nend = 0.2", "begin < end"
+    ),
+    "an unknown gait": toml("based_on = 'take-off'\ngait = {kind = 'canter', steps = 2}", "'gait.kind' is 'canter'"),
+    "a gait without steps": toml(
+        "based_on = 'take-off'\ngait = {kind = 'walk', steps = 0}", "steps is 0", "at least one"
+    ),
+    "a jet that cannot fail": toml(
+        "based_on = 'take-off'\n[[failures]]\njet = 'tail'", "unknown jet 'tail'", error=None
+    ),
+    "a jet that fails after the end": toml(
+        "based_on = 'take-off'\n[[failures]]\njet = 'left arm'\nat = 1.5", "at is 1.5", "below 1"
+    ),
+    "a wall without a direction": toml(
+        "based_on = 'take-off'\n[[walls]]\nnormal = [0, 0, 0]\noffset = 1", "a direction with a length"
+    ),
+    "a box inside out": toml(
+        "based_on = 'take-off'\n[[boxes]]\nlower = [1, 1, 1]\nupper = [0, 0, 0]", "finite numbers that rise"
+    ),
     "half a scenario": toml("title = 'half'", "the scenario lacks", "'knots'"),
     # robots
     "a URDF elsewhere": robot('"ironcub.urdf"', '"../../ironcub.urdf"', "'urdf' is", "outside the robot's folder"),

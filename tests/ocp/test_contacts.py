@@ -193,3 +193,38 @@ def test_contacts_that_make_no_sense_for_a_robot_are_refused(dog, contacts, says
 def test_a_stretch_that_makes_no_sense_is_refused(fields, says):
     with pytest.raises(ScenarioError, match=says):
         mt.ContactStretch(**fields)
+
+
+# ------------------------------------------------------------------------------------- solved again, and explained
+
+
+def test_a_planner_solves_a_trot_with_another_end_from_the_last_answer(dog):
+    scenario = trot(dog, terminal=mt.Terminal.FREE)
+    planner = mt.Planner(dog, scenario)
+    first = planner.solve()
+    x, y, z = scenario.final_com
+    again = planner.solve(final_com=(x - 0.05, y, z))
+    assert first.feasible
+    assert again.feasible
+    assert again.iterations < first.iterations
+    assert again.trajectory.com_position[0, -1] == pytest.approx(x - 0.05, abs=1e-6)
+    assert "given_off" in planner.problem.bound_rows
+    unloaded = Schedule.of(dog, scenario).unloaded
+    assert np.abs(again.trajectory.per_contact("contact_forces").transpose(0, 2, 1)[unloaded]).max() == 0.0
+
+
+def test_an_answer_is_a_warm_start_for_the_same_contacts(trotted, trotting):
+    again = mt.solve(trotting, start=trotted.trajectory)
+    assert again.status is mt.Status.OPTIMAL
+    assert again.objective == pytest.approx(trotted.objective, rel=1e-3)
+
+
+def test_what_gives_way_names_what_was_given(dog):
+    """A flight that the speed of the base does not allow: feet that have to stay up give way, or what holds it up."""
+    scenario = trot(dog, knots=20, gait=None, interval_min=0.05, interval_max=0.05, base_speed_max=0.5)
+    hop = replace(
+        scenario, contacts=(given(LEGS, OFF, 0.25, 0.75), given(LEGS, ON, 0.0, 0.25)), final_com=scenario.initial_com
+    )
+    relaxed = mt.relax(mt.build(dog, hop), terms=("given_off",))
+    assert relaxed.status.solved
+    assert [term.name for term in relaxed.gives_way] == ["given_off"]

@@ -1,0 +1,111 @@
+"""Contacts given against contacts found: the same tasks solved both ways, as a table in Markdown.
+
+    python benchmarks/contacts.py [walk trot jump mixed]
+
+Needs MuJoCo and the package `example-robot-data`. Seconds are processor time of the solve; iterations do not depend on
+the machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from importlib.metadata import files
+from pathlib import Path
+
+import multimodal_to as mt
+from multimodal_to.models.robot import Robot
+from multimodal_to.simulation import play, tracking
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+HEAD = "| task | contacts | rows | iterations | seconds | objective | answer | audit | MuJoCo |"
+
+
+def walk() -> Iterator[tuple[str, Robot, mt.Scenario]]:
+    """Give the walk to fly, whose steps are found, and with four steps before the take-off that are given."""
+    robot, found = mt.load_robot("ironcub"), mt.scenarios.walk_to_fly()
+    yield "found", robot, found
+    in_air = mt.ContactStretch(of=tuple(robot.feet), state=mt.ContactState.OFF, begin=0.8)
+    plan = mt.GaitPlan(kind=mt.GaitKind.WALK, steps=4, begin=0.05, end=0.8, clearance=0.02)
+    yield "given", robot, replace(found, guess_steps=0, gait=plan, contacts=(in_air,))
+
+
+def solo12() -> Robot:
+    """Return Solo12 with the `robot.toml` of the examples."""
+    folder = Path(tempfile.mkdtemp())
+    (folder / "robot.toml").write_text((EXAMPLES / "solo12" / "robot.toml").read_text(encoding="utf-8"))
+    urdf = next(file for file in files("example-robot-data") or [] if file.name == "solo12.urdf")
+    (folder / "solo12.urdf").symlink_to(Path(str(urdf.locate())).resolve())
+    return mt.load_robot(folder)
+
+
+def trot() -> Iterator[tuple[str, Robot, mt.Scenario]]:
+    """Give the trot of Solo12; where it is found, its feet skim, and the start guess steps as often."""
+    robot, given = solo12(), mt.scenario_files.load(EXAMPLES / "solo12" / "trot.toml")
+    yield "found", robot, replace(given, gait=None, guess_steps=8)
+    yield "given", robot, given
+
+
+def mixed() -> Iterator[tuple[str, Robot, mt.Scenario]]:
+    """Give the trot with three feet given and one found."""
+    robot, given = solo12(), mt.scenario_files.load(EXAMPLES / "solo12" / "trot.toml")
+    free = mt.ContactStretch(of=("FL",), state=mt.ContactState.FREE)
+    yield "three feet given, one found", robot, replace(given, contacts=(free,))
+
+
+def jump() -> Iterator[tuple[str, Robot, mt.Scenario]]:
+    """Give the jump onto a box of 10 cm; where it is found, the start guess glides onto the box."""
+    robot, given = mt.load_robot("ironcub"), mt.scenario_files.load(EXAMPLES / "jump-onto-box.toml")
+    yield "found", robot, replace(given, gait=None)
+    yield "given", robot, given
+
+
+TASKS = {"walk": walk, "trot": trot, "jump": jump, "mixed": mixed}
+
+
+def row(task: str, contacts: str, robot: Robot, scenario: mt.Scenario) -> str:
+    """Return a row of the table.
+
+    Args:
+        task: its name.
+        contacts: how they come about.
+        robot: that moves.
+        scenario: the task.
+    """
+    problem = mt.build(robot, scenario)
+    began = time.process_time()
+    solution = mt.solve(problem)
+    seconds = time.process_time() - began
+    verdict = mt.audit(problem.robot, solution.trajectory)
+    wrong = [finding.name for finding in verdict.findings if not finding.holds]
+    end = tracking(play(problem.robot, solution.trajectory)).end if solution.feasible else "–"
+    parts = (
+        task,
+        contacts,
+        problem.row_lower.size,
+        solution.iterations,
+        f"{seconds:.1f}",
+        f"{solution.objective:.3g}",
+        solution.status.value + (f", airborne {verdict.airborne:.2f} s" if task == "jump" else ""),
+        "true" if not wrong else f"{len(wrong)} miss: {', '.join(wrong[:2])}",
+        end,
+    )
+    return "| " + " | ".join(str(part) for part in parts) + " |"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("tasks", nargs="*", help=f"of {', '.join(TASKS)}")
+    print(HEAD)
+    print("|--" * (HEAD.count("|") - 1) + "|")
+    for name in parser.parse_args().tasks or TASKS:
+        for contacts, robot, scenario in TASKS[name]():
+            print(row(name, contacts, robot, scenario), flush=True)
+
+
+if __name__ == "__main__":
+    main()
