@@ -70,8 +70,10 @@ def read_urdf(urdf: str | os.PathLike[str]) -> tuple[list[Link], list[Joint]]:
     return [_link(link) for link in robot.links], [_joint(joint) for joint in robot.joints]
 
 
-def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
+def parse_urdf(urdf: str | os.PathLike[str], *, collisions: bool = False) -> Any:
     """Return what a URDF holds as `yourdfpy` has it: its links with their visuals, joints and materials.
+
+    With `collisions` the visuals of its links are their collision shapes instead.
 
     No mesh is looked for. Every element that is kept has what it cannot do without, in finite numbers, and names are
     not given twice; whether the joints form a tree, `load_tree` says.
@@ -83,6 +85,8 @@ def parse_urdf(urdf: str | os.PathLike[str]) -> Any:
     import yourdfpy  # takes longer to import than all the rest, and what reads no URDF does without
 
     root, source = _root(urdf)
+    if collisions:
+        _show_collisions(root)
     _keep_what_is_used(root)
     _check_names(root, source)
     _refuse_missing(root, source)
@@ -139,7 +143,8 @@ def _root(urdf: str | os.PathLike[str]) -> tuple[Any, str]:
     if root.getroottree().docinfo.internalDTD is not None:
         raise ModelError(f"{source} {_ENTITIES}")
     if root.tag != "robot":
-        raise ModelError(f"{source} is no URDF: its root element is <{root.tag}>, expected <robot>")
+        other = "; MJCF is not read, convert it to a URDF" if root.tag == "mujoco" else ""
+        raise ModelError(f"{source} is no URDF: its root element is <{root.tag}>, expected <robot>{other}")
     if (count := sum(1 for _ in root.iter())) > MOST_ELEMENTS:
         raise ModelError(f"{source} has {count} elements; at most {MOST_ELEMENTS} are read")
     if root.get("name") is None:
@@ -171,6 +176,15 @@ _NEEDED_WITHIN = {
     "mesh": ("filename",),
 }
 _SHAPES = ("box", "cylinder", "sphere", "mesh")
+
+
+def _show_collisions(root: Any) -> None:
+    """Put the collision shapes of each link in the place of its visuals."""
+    for link in root.iterchildren("link"):
+        for visual in [*link.iterchildren("visual")]:
+            link.remove(visual)
+        for collision in [*link.iterchildren("collision")]:
+            collision.tag = "visual"
 
 
 def _keep_what_is_used(root: Any) -> None:
