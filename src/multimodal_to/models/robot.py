@@ -359,7 +359,11 @@ def _refuse_faults(file: RobotFile, urdf: Path) -> None:
         faults += [where + unknown("joint", member, file.joints) for member in members if member not in file.joints]
         faults += _repeated(f"{where}joint", members)
     names = [link.name for link in links]
-    faults += [f"'frames.{name}': {unknown('link', of.link, names)}" for name, of in file.frames.items() if of.link not in names]
+    faults += [
+        f"'frames.{name}': {unknown('link', of.link, names)}"
+        for name, of in file.frames.items()
+        if of.link not in names
+    ]
     faults += [f"the frame '{name}' exists already; expected another name" for name in file.frames if name in names]
     known = dict.fromkeys((*names, *file.frames))
     contacts = [frame for frames in file.contact.feet.values() for frame in frames]

@@ -12,7 +12,7 @@ import numpy as np
 from multimodal_to.adam import KinDynComputations, quaternion
 from multimodal_to.adam.inspection import VELOCITY_PLACEHOLDER
 from multimodal_to.adam.lean_tree import independent
-from multimodal_to.adam.spatial import Array
+from multimodal_to.adam.spatial import Array, rotation_from_rpy
 from multimodal_to.adam.tree import BASE, FixedFrame, Joint, Link
 from multimodal_to.adam.urdf import parse_urdf, read_urdf
 from multimodal_to.errors import ModelError, unknown
@@ -45,6 +45,8 @@ LONGER = 0.05
 """How much farther from the CoM than with its leg stretched a contact point may be [L]."""
 ALONG = 0.6
 """How far along the ground a contact point may be from its hip, as a share of the leg's length [1]."""
+AHEAD = 0.02
+"""How far ahead of the ankle the middle of a sole is at least where it tells where ahead is [L]."""
 _SAME_PLACE = 1e-3  # of a contact point and a link's frame [m]
 
 
@@ -86,6 +88,14 @@ class Draft(Value):
     def home(self) -> Array:
         """Return s at home, (n,)."""
         return self.stance.joints
+
+    @property
+    def base_quaternion_xyzw(self) -> Array:
+        """Return how the base is turned at home, (4,)."""
+        if self.state is not None:
+            return np.array(self.state.base_quaternion_xyzw)
+        yaw = np.arctan2(self.stance.turn[1, 0], self.stance.turn[0, 0])
+        return attitude.tidied(np.array([0.0, 0.0, np.sin(0.5 * yaw), np.cos(0.5 * yaw)]))
 
     @property
     def contacts(self) -> Array:
@@ -130,6 +140,9 @@ def draft(urdf: Path, *, jets: Sequence[str] = (), contacts: bool = True, name: 
         feet = tuple(kindyn.tree.frame(link).body for link in soles)
         stance = _stance(kindyn, state)
     shapes = body_points(stance, points)
+    if state is None and (turned := _heading(stance, shapes, feet)):
+        stance = replace(stance, turn=rotation_from_rpy(0.0, 0.0, -0.5 * np.pi * turned))
+        shapes = body_points(stance, points)
     if contacts and not feet and (kindyn.joint_names or BASE not in shapes) and not jets:
         raise ModelError(_no_feet(kindyn, shapes))
     return _with_contacts(
@@ -387,6 +400,25 @@ def _reach(stance: Stance, legs: Sequence[Leg], height: float) -> Array | None:
 def _links_of(kindyn: KinDynComputations, bodies: Sequence[int]) -> list[str]:
     links = carried(kindyn.tree)
     return [link for body in bodies for link in links.get(body, ())]
+
+
+def _heading(stance: Stance, shapes: Mapping[int, Array], feet: Sequence[int]) -> int:
+    """Return where soles point to from their ankles, in quarter turns to the left of x; zero where they do not say.
+
+    Args:
+        stance: of the robot at home.
+        shapes: points on bodies [m], (points, 3).
+        feet: bodies that the robot stands on.
+    """
+    ahead, height = [], float(stance.com[2]) - min((float(of[:, 2].min()) for of in shapes.values()), default=0.0)
+    for foot in feet:
+        corners = contact_points(shapes[foot], height)
+        if len(corners) > 1:
+            ahead.append((corners.mean(axis=0) - stance.places([stance.kindyn.tree.bodies[foot].name])[0])[:2])
+    x, y = np.mean(ahead, axis=0) if ahead else (0.0, 0.0)
+    if max(abs(x), abs(y)) < AHEAD * height or min(abs(x), abs(y)) > 0.5 * max(abs(x), abs(y)):
+        return 0
+    return int(np.round(np.arctan2(y, x) / (0.5 * np.pi)))
 
 
 def _up_in(stance: Stance, frame: str) -> tuple[float, float, float]:

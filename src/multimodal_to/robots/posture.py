@@ -18,6 +18,7 @@ BENT = 0.08
 SHORTER = 0.06
 """How much a straight leg is shortened, as a share of its length [1]."""
 _SEEDS, _STEPS, _SPREAD = 24, 60, 0.8  # of the search; the last in rad
+_THIGH = 0.8  # of the leg is left where a hip ends [1]
 _LONGEST, _DONE = 0.3, 1e-5  # step [rad]
 _NEAR = 1e-3  # m
 _DAMPING, _PULL = 1e-5, 1e-3
@@ -78,6 +79,14 @@ class Leg:
         places = cs.vertcat(*(pose[:3, 3] for pose in poses))
         return cs.Function("places", [joints], [places, cs.jacobian(places, joints)])
 
+    @cached_property
+    def _foot(self) -> cs.Function:
+        joints, tree = cs.SX.sym("s", len(self.kindyn.joint_names)), self.kindyn.tree
+        last = self.contacts[0] if len(self.contacts) < 3 else tree.bodies[tree.frame(self.contacts[0]).body].name
+        base = self._at(np.zeros(joints.shape[0])).base
+        foot = self.kindyn.forward_kinematics(last, cs.SX(base), joints)[:3, 3]
+        return cs.Function("foot", [joints], [foot, cs.jacobian(foot, joints)])
+
     def _at(self, joints: Array) -> Stance:
         return Stance(kindyn=self.kindyn, turn=self.turn, joints=joints)
 
@@ -87,15 +96,26 @@ class Leg:
         return places.reshape(-1, 3), jacobian
 
     def stretch(self, joints: Array) -> tuple[Array, float]:
-        """Return how much each joint of the robot changes the length of the leg [m/rad], (n,), and that length [m]."""
-        hip = self._at(joints).pose(self.root)[:3, 3]
-        places, jacobian = self.places(joints)
-        away = places.mean(axis=0) - hip
-        length = float(np.linalg.norm(away))
-        rates = away @ jacobian.reshape(len(places), 3, -1).mean(axis=0) / max(length, 1e-9)
-        kept = np.zeros_like(rates)
-        kept[list(self.columns)] = rates[list(self.columns)]
-        return kept, length
+        """Return how much each joint of the robot changes the length of the leg [m/rad], (n,), and that length [m].
+
+        The leg ends in its contact point, or in the ankle where it has a sole. It begins in that one of its first joints
+        that the others turn about most purely: hips have their axes apart.
+        """
+        tree = self.kindyn.tree
+        foot, jacobian = (np.array(part) for part in self._foot(joints))
+        chain = [tree.bodies[body].name for body in tree.path(tree.frame(self.contacts[0]).body)]
+        hips = self._at(joints).places(chain[chain.index(self.root) :])
+        arms = foot.ravel() - hips
+        lengths = np.linalg.norm(arms, axis=1)
+        own, best = list(self.columns), (np.zeros(joints.size), 0.0)
+        for arm, length in zip(arms, lengths, strict=True):
+            if length < _THIGH * lengths.max() or not length:
+                continue
+            rates = np.zeros(joints.size)
+            rates[own] = (arm @ jacobian / length)[own]
+            if not best[1] or np.abs(rates).max() < np.abs(best[0]).max():
+                best = rates, float(length)
+        return best
 
     def is_straight(self, joints: Array) -> bool:
         """Return whether no joint changes the length of the leg by more than `BENT` of it."""

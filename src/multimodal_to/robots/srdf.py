@@ -85,6 +85,4 @@ def _states(path: Path, robot_name: str, stem: str, joints: frozenset[str]) -> I
             elif len(values) == 7 and abs(sum(value**2 for value in values[3:]) - 1.0) < _ROUNDED:  # of a floating base
                 turn = values[3], values[4], values[5], values[6]
         if positions:
-            yield GroupState(
-                name=state.get("name", ""), source=path, positions=positions, base_quaternion_xyzw=turn
-            )
+            yield GroupState(name=state.get("name", ""), source=path, positions=positions, base_quaternion_xyzw=turn)

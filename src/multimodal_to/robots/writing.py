@@ -30,7 +30,12 @@ def toml(draft: Draft, urdf: str) -> str:
         draft: the robot.
         urdf: what the file says of where the URDF is.
     """
-    return "\n".join([*_head(draft, urdf), *_joints(draft), *_groups(draft), *_home(draft), *_contact(draft), *_jets(draft)]) + "\n"
+    return (
+        "\n".join(
+            [*_head(draft, urdf), *_joints(draft), *_groups(draft), *_home(draft), *_contact(draft), *_jets(draft)]
+        )
+        + "\n"
+    )
 
 
 def _head(draft: Draft, urdf: str) -> Iterator[str]:
@@ -51,10 +56,13 @@ def _joints(draft: Draft) -> Iterator[str]:
         guesses = list(of.guesses)
         if is_placeholder(joint.effort) or not np.isfinite(joint.effort):
             share = next(
-                (share for group, share in EFFORT.items() if joint.name in draft.groups.get(group, ())), EFFORT_OF_OTHERS
+                (share for group, share in EFFORT.items() if joint.name in draft.groups.get(group, ())),
+                EFFORT_OF_OTHERS,
             )
             proposal = f"effort = {float(f'{share * weight_times_height:.2g}'):g}"
-            guesses.append(f"the URDF's effort {joint.effort:g} limits nothing; state the motor's own, perhaps {proposal}")
+            guesses.append(
+                f"the URDF's effort {joint.effort:g} limits nothing; state the motor's own, perhaps {proposal}"
+            )
         entries = f"lower = {_number(of.lower)}, upper = {_number(of.upper)}, speed = {_number(of.speed)}"
         comment = f"  # {'; '.join(guesses)}" if guesses else ""
         at_home = _number(min(max(round(float(home), 4), of.lower), of.upper))
@@ -76,17 +84,19 @@ def _home(draft: Draft) -> Iterator[str]:
     yield ""
     yield f"# Joints at home: {source}{_bent(draft)}. The lowest contact point is on the ground."
     if draft.state is None:
-        yield "# A guess: the base is upright, x is ahead and z is up."
+        ahead = "the soles say where ahead is" if draft.base_quaternion_xyzw[3] != 1.0 else "x is ahead"
+        yield f"# A guess: the base is upright and z is up; {ahead}."
     yield "[home]"
     yield f"base_position = [0.0, 0.0, {_number(round(draft.base_height, 5))}]  # [m], world"
-    turn = (0.0, 0.0, 0.0, 1.0) if draft.state is None else draft.state.base_quaternion_xyzw
-    yield f"base_quaternion_xyzw = [{', '.join(map(_number, turn))}]"
+    yield f"base_quaternion_xyzw = [{', '.join(map(_number, draft.base_quaternion_xyzw))}]"
 
 
 def _bent(draft: Draft) -> str:
     if not draft.bent_legs:
         return ""
-    return f"; bent, as they would be straight (a guess): {', '.join(name.replace('_', ' ') for name in draft.bent_legs)}"
+    return (
+        f"; bent, as they would be straight (a guess): {', '.join(name.replace('_', ' ') for name in draft.bent_legs)}"
+    )
 
 
 def _contact(draft: Draft) -> Iterator[str]:
