@@ -126,7 +126,8 @@ class Records:
         if get_origin(kind) is Mapping:
             if not isinstance(value, Mapping):
                 raise self._wrong(key, value, "a table")
-            inner, faults, made = get_args(kind)[1], [], dict(base or {})
+            inner, made = get_args(kind)[1], dict(base or {})
+            faults: list[str] = []
             for name, entry in value.items():
                 with self._noted(faults):
                     made[name] = self.value(inner, entry, f"{key}.{name}", None)

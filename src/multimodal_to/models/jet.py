@@ -1,7 +1,8 @@
 """Engines: how the thrust of a jet follows its throttle, by a law of order two, one or none.
 
 The law of order two is that of a model jet turbine: G. L'Erario et al., "Modeling, identification and control of model
-jet engines for jet powered robotics", RA-L 2020, equation (8) of L'Erario et al. 2022. The others are for rotors and fans.
+jet engines for jet powered robotics", RA-L 2020, equation (8) of L'Erario et al. 2022. The others are for rotors and
+fans.
 """
 
 from __future__ import annotations
@@ -268,7 +269,7 @@ def _positive(name: str, number: float) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Jet:
-    """An engine on the robot: a force of size T along −z of `frame`, at its origin, and a moment about the same axis."""
+    """An engine on the robot: a force T along −z of `frame`, at its origin, and a moment about the same axis."""
 
     name: str
     frame: str

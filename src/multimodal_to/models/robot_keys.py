@@ -140,8 +140,8 @@ class JetTable:
     thrust_axis: Vector3 = (0.0, 0.0, -1.0)
     """Direction of the thrust on the robot, in the frame; of any length but zero."""
     drag: float = 0.0
-    """Moment of a rotor's drag on the robot for each newton of thrust [m], right-handed about `thrust_axis`: positive for
-    a rotor that turns clockwise, seen from where the thrust points to."""
+    """Moment of a rotor's drag on the robot for each newton of thrust [m], right-handed about `thrust_axis`: positive
+    for a rotor that turns clockwise, seen from where the thrust points to."""
     plume_length: float | None = None
     """How far the exhaust reaches from the frame's origin, against the thrust [m]. A jet has a plume where this or
     `plume_radius` is stated. Where only that one is, the length is L: heat and size of a jet grow with its robot."""
@@ -197,8 +197,8 @@ class RobotFile:
     name: str
     """What the robot is called."""
     urdf: str
-    """Path of the URDF, from the robot's folder and inside it, where a link may lie; or `package://NAME/PATH`, a file of
-    an installed package or of a folder NAME beside or above."""
+    """Path of the URDF, from the robot's folder and inside it, where a link may lie; or `package://NAME/PATH`, a file
+    of an installed package or of a folder NAME beside or above."""
     home: HomeTable
     """The home posture, together with the joints' own; postures are searched near it."""
     joints: Mapping[str, JointTable] = field(default_factory=dict)

@@ -17,6 +17,7 @@ from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import (
     Constraint,
     Cost,
+    EngineUnits,
     IntervalFunction,
     JointUnits,
     KnotFunction,
@@ -54,6 +55,10 @@ class _Each:
 
 def _each(of: str, *axes: str) -> Labels:
     return _Each(of, axes or ("",))
+
+
+def _lagging_jets(parameters: Parameters) -> tuple[str, ...]:
+    return tuple(parameters.robot.jet_names[index] for index in constraints.lagging_jets(parameters.robot))
 
 
 def _faces(parameters: Parameters) -> tuple[str, ...]:
@@ -188,7 +193,7 @@ STATIC_EQUILIBRIUM = Constraint(
 STEADY_THRUST = Constraint(
     value=constraints.steady_thrust,
     within=equal(),
-    unit="N/s²",
+    unit=EngineUnits("N", "N/s", "N/s²"),
     holds=Where.FIRST_KNOT,
     scale=FORCE,
     labels=_each("jet"),
@@ -232,7 +237,7 @@ THRUST_INTEGRATION = Constraint(
 THRUST_DYNAMICS = Constraint(
     value=constraints.thrust_dynamics,
     within=equal(),
-    unit="N/s",
+    unit=EngineUnits("N", "N/s", "N/s"),
     holds=Where.EVERY_INTERVAL,
     scale=FORCE,
     labels=_each("jet"),
@@ -278,12 +283,12 @@ FINAL_EQUILIBRIUM = Constraint(
 )
 FINAL_STEADY_THRUST = Constraint(
     name="final_steady_thrust",
-    value=constraints.steady_thrust,
+    value=constraints.final_steady_thrust,
     within=equal(),
-    unit="N/s²",
+    unit=EngineUnits("N", "N/s", "N/s²", lagging=True),
     holds=Where.LAST_KNOT,
     scale=FORCE,
-    labels=_each("jet"),
+    labels=_lagging_jets,
     when=_hovers_last,
 )
 MOMENTUM_AT_START = Constraint(

@@ -11,8 +11,8 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import ModelError, unknown
-from multimodal_to.files.reading import read_toml
 from multimodal_to.files.packages import package_file
+from multimodal_to.files.reading import read_toml
 from multimodal_to.files.records import Records
 
 DRESS_FILE = "dress.toml"

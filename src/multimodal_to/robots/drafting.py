@@ -251,7 +251,7 @@ def _undriven(joint: Joint) -> bool:
 
 
 def _stance(kindyn: KinDynComputations, state: GroupState | None) -> Stance:
-    """Return how the robot stands in an SRDF, or else upright with joints at zero, or mid-range where that is outside."""
+    """Return how the robot stands in an SRDF, or else with joints at zero, or mid-range where that is outside."""
     stated = {} if state is None else state.positions
     values = [stated.get(joint.name, mid_range(joint.lower, joint.upper)) for joint in kindyn.tree.joints]
     limits = [(joint.lower, joint.upper) for joint in kindyn.tree.joints]

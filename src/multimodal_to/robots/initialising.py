@@ -39,9 +39,9 @@ def init(
 ) -> Made:
     """Write a folder with a `robot.toml` for a URDF, and the URDF itself, a copy of it or a link to it.
 
-    Joints, groups, a home posture, contact points and jets come from the URDF and from guesses, each with a comment that
-    says so. A URDF of an installed package stays where it is; another is copied, or linked to where its meshes would
-    not be found from the copy.
+    Joints, groups, a home posture, contact points and jets come from the URDF and from guesses, each with a comment
+    that says so. A URDF of an installed package stays where it is; another is copied, or linked to where its meshes
+    would not be found from the copy.
 
     Args:
         urdf: path of the URDF. MJCF is not read.

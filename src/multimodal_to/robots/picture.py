@@ -113,7 +113,7 @@ def _primitive(visual: Visual) -> Array:
 def _capsule(robot: Robot, capsule: Capsule) -> Array:
     mesh = trimesh.creation.capsule(height=max(capsule.length, 1e-6), radius=capsule.radius, count=[12, 8])
     axis = (capsule.end - capsule.start) / capsule.length if capsule.length else np.array([0.0, 0.0, 1.0])
-    turn = trimesh.geometry.align_vectors([0.0, 0.0, 1.0], axis)
+    turn = np.asarray(trimesh.geometry.align_vectors([0.0, 0.0, 1.0], axis))  # type: ignore[no-untyped-call]
     own = np.array(mesh.triangles, dtype=float)
     own[:, :, 2] -= 0.5 * (own[:, :, 2].min() + own[:, :, 2].max())
     pose = _pose(robot, capsule.frame)

@@ -98,8 +98,8 @@ class Leg:
     def stretch(self, joints: Array) -> tuple[Array, float]:
         """Return how much each joint of the robot changes the length of the leg [m/rad], (n,), and that length [m].
 
-        The leg ends in its contact point, or in the ankle where it has a sole. It begins in that one of its first joints
-        that the others turn about most purely: hips have their axes apart.
+        The leg ends in its contact point, or in the ankle where it has a sole. It begins in that one of its first
+        joints that the others turn about most purely: hips have their axes apart.
         """
         tree = self.kindyn.tree
         foot, jacobian = (np.array(part) for part in self._foot(joints))

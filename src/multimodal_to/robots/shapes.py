@@ -1,4 +1,4 @@
-"""Where a robot is solid: points on the shapes of its links, from the collision shapes of the URDF or else its visuals."""
+"""Points on the shapes of links: of the collision shapes of a URDF, or else of its visuals."""
 
 from __future__ import annotations
 

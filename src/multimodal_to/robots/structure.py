@@ -54,7 +54,7 @@ def body_points(stance: Stance, points: Mapping[str, Array]) -> dict[int, Array]
 
 
 def feet_of(stance: Stance, points: Mapping[int, Array]) -> tuple[int, ...]:
-    """Return the bodies that a robot stands on: ends of limbs that are as low as its lowest one, and lower than its base.
+    """Return the bodies that a robot stands on: ends of limbs as low as its lowest one, and lower than its base.
 
     There are none where the CoM is not above them: an arm hangs down beside its table.
 
@@ -87,7 +87,7 @@ def middle_of(stance: Stance, body: int, points: Mapping[int, Array]) -> Array:
     """
     if body in points:
         return _middle(points[body])
-    return stance.places([stance.kindyn.tree.bodies[body].name])[0]
+    return np.asarray(stance.places([stance.kindyn.tree.bodies[body].name])[0])
 
 
 def _middle(points: Array) -> Array:
@@ -97,7 +97,9 @@ def _middle(points: Array) -> Array:
 def limbs_of(
     tree: Tree, feet: Sequence[int], where: Mapping[int, Array]
 ) -> tuple[tuple[Limb, ...], tuple[Limb, ...], tuple[str, ...]]:
-    """Return the legs of a robot, its other limbs, and the joints of its torso. The torso is what carries limbs of both sides, or a leg and another limb.
+    """Return the legs of a robot, its other limbs, and the joints of its torso.
+
+    The torso is what carries limbs of both sides, or a leg and another limb.
 
     Args:
         tree: of the robot.
