@@ -11,6 +11,8 @@ FLAT = 0.005
 """Points so near to a plane belong to it [L]."""
 SOLE = 0.07
 """A plane is a sole where it is at least so wide and so long [L]."""
+LEVEL = np.radians(2.0)
+"""A sole that is tilted by less is taken as level: meshes are rough [rad]."""
 TILTED = np.radians(20.0)
 """A sole is tilted by less than this at home [rad]."""
 
@@ -48,6 +50,7 @@ def _sole(points: Array, height: float) -> Array | None:
         area = float(np.prod(high - low)) * abs(float(normal[2]))
         if (high - low).min() >= SOLE * height and area > widest * 1.02:
             across = np.array([[high[0], high[1]], [low[0], high[1]], [low[0], low[1]], [high[0], low[1]]])
-            heights = corner[2] - ((across - corner[:2]) @ normal[:2]) / normal[2]
+            level = normal[2] < -np.cos(LEVEL)
+            heights = np.full(4, lowest) if level else corner[2] - ((across - corner[:2]) @ normal[:2]) / normal[2]
             best, widest = np.column_stack([across, heights]), area
     return best

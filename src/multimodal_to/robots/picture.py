@@ -17,7 +17,11 @@ from multimodal_to.replay.meshes import MeshWarning, simplified
 from multimodal_to.replay.visuals import Visual, appearance
 
 _FACES = 9000  # of all meshes together
-_VIEWS = (("from ahead on the left", 18.0, 38.0), ("from the right", 2.0, -90.0), ("from ahead", 2.0, 0.0))
+_VIEWS = (
+    ("from ahead on the left", 18.0, 38.0, None),
+    ("from the right", 0.0, -90.0, "y"),
+    ("from ahead", 0.0, 0.0, "x"),
+)
 _AXES = ("#d62728", "#2ca02c", "#1f77b4")  # x, y, z
 _CONTACT, _JET, _CAPSULE = "#d62728", "#9467bd", "#ff7f0e"
 _LIGHT = np.array([0.4, -0.5, 0.8]) / np.linalg.norm([0.4, -0.5, 0.8])
@@ -41,7 +45,7 @@ def draw_home(robot: Robot, *, capsules: bool = True) -> Figure:
     seen = np.vstack([triangles.reshape(-1, 3), points, robot.home.base_position])
     low, high = seen.min(axis=0), seen.max(axis=0)
     size = float((high - low).max())
-    for index, (title, elevation, azimuth) in enumerate(_VIEWS):
+    for index, (title, elevation, azimuth, along) in enumerate(_VIEWS):
         axes: Any = figure.add_subplot(1, len(_VIEWS), index + 1, projection="3d", computed_zorder=False)
         axes.add_collection3d(Poly3DCollection(triangles, facecolors=colours, edgecolors="none", zorder=1))
         for shell in shells:
@@ -55,6 +59,9 @@ def draw_home(robot: Robot, *, capsules: bool = True) -> Figure:
         for name, centre in zip("xyz", middle, strict=True):
             getattr(axes, f"set_{name}lim")(centre - 0.5 * size, centre + 0.5 * size)
             getattr(axes, f"set_{name}label")(f"{name} [m]")
+        if along is not None:  # seen along this axis, whose numbers lie on each other
+            getattr(axes, f"set_{along}ticks")([])
+            getattr(axes, f"set_{along}label")("")
         axes.set_box_aspect((1, 1, 1), zoom=1.25)
         axes.set_proj_type("ortho")
         axes.view_init(elevation, azimuth)
