@@ -54,7 +54,7 @@ def doctor(robot: Robot, scenario: Scenario, formulation: Formulation | None = N
         formulation: what the problem is made of; by default `Formulation.executable()`.
     """
     task = Task.of(robot, scenario, formulation)
-    if not robot.contacts:
+    if not robot.contacts and (task.stands_at_start or task.stands_at_end):
         return refusal("contacts", f"{robot.name} has no contact points to stand on", "name some in its robot.toml")
     findings = [finding for check in CHECKS for finding in check(task)]
     diagnosis = Diagnosis(findings=tuple(findings))
