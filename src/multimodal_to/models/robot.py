@@ -354,10 +354,12 @@ def _refuse_faults(file: RobotFile, urdf: Path) -> None:
     links, joints = read_urdf(urdf)
     movable = [joint.name for joint in joints if joint.kind != "fixed"]
     faults = [unknown("joint", name, movable) for name in file.joints if name not in movable]
+    strange: dict[str, str] = {}  # a joint's first group
     for group, members in file.joint_groups.items():
-        where = f"joint group '{group}': "
-        faults += [where + unknown("joint", member, file.joints) for member in members if member not in file.joints]
-        faults += _repeated(f"{where}joint", members)
+        for member in (member for member in members if member not in file.joints):
+            strange.setdefault(member, group)
+        faults += _repeated(f"joint group '{group}': joint", members)
+    faults += [f"joint group '{group}': {unknown('joint', name, file.joints)}" for name, group in strange.items()]
     names = [link.name for link in links]
     faults += [
         f"'frames.{name}': {unknown('link', of.link, names)}"

@@ -138,7 +138,7 @@ class JetTable:
     throttle: tuple[float, float]
     """Least and greatest throttle [%]."""
     thrust_axis: Vector3 = (0.0, 0.0, -1.0)
-    """Direction of the thrust on the robot, in the frame; of any length but zero."""
+    """Direction of the thrust on the robot, in the frame; of any length but zero [1]."""
     drag: float = 0.0
     """Moment of a rotor's drag on the robot for each newton of thrust [m], right-handed about `thrust_axis`: positive
     for a rotor that turns clockwise, seen from where the thrust points to."""
