@@ -22,7 +22,7 @@ FLOORS = [
     {"ocp", "auditing", "simulation", "replay"},
     {"solving"},
     {"doctor", "plotting"},
-    {"reporting"},
+    {"reporting", "robots"},
     {"cli", "__init__"},
     {"__main__"},
 ]

@@ -10,7 +10,7 @@ trajectory and the robot.
 from multimodal_to import ending  # noqa: F401
 
 # isort: on
-from multimodal_to import scenarios
+from multimodal_to import robots, scenarios
 from multimodal_to.adam import KinDynComputations
 from multimodal_to.auditing import Audit, audit
 from multimodal_to.doctor import Diagnosis, doctor
@@ -129,6 +129,7 @@ __all__ = [
     "load_robot",
     "read_motion",
     "relax",
+    "robots",
     "scenario_files",
     "scenarios",
     "solve",

@@ -14,22 +14,37 @@ from multimodal_to.models.robot_keys import robot_keys
 
 KEYS = robot_keys()
 FULL = tomllib.loads((bundled_robots()["ironcub"] / "robot.toml").read_text(encoding="utf-8"))
-ANY = {"joints": "torso_roll", "jet_models": "P220"}
+"""The iRonCub's file, and beside it what only other robots need."""
+FULL["frames"] = {"nose": {"link": "head", "position": [0.0, 0.1, 0.0], "rpy": [0.0, 0.5, 0.0]}}
+FULL["jet"][0] |= {"thrust_axis": [0.0, 0.0, -1.0], "drag": 0.0}
+for name in ("P160", "P220"):
+    FULL["jet_models"][name]["kind"] = "second-order"
+FULL["jet_models"] |= {
+    "fan": {"kind": "first-order", "gain": 2.0, "time_constant": 0.1},
+    "rotor": {"kind": "static", "gain": 1.0, "curvature": 0.01},
+}
+ANY = {"joints": "torso_roll", "jet_models": "P220", "frames": "nose"}
+OF_KIND = {"first-order": "fan", "static": "rotor"}
+
+
+def any_name(key):
+    """The name of the joint, frame or jet model that a key is tried with."""
+    kind = key.where.rpartition(" = ")[2]
+    return OF_KIND.get(kind, ANY.get(key.name.split(".")[0], ""))
 
 
 def placed(key, table):
     """The table that holds a key, and the key's own name there: of one joint, jet model or jet where there are many."""
     *parents, last = re.sub(r"\[\]", "", key.name).split(".")
     for parent in parents:
-        place = table[ANY[parents[0]] if parent == "<name>" else parent]
+        place = table[any_name(key) if parent == "<name>" else parent]
         table = place[0] if isinstance(place, list) else place
     return table, last
 
 
 def spelled(key):
     """A key's name in an error."""
-    top = key.name.split(".")[0]
-    return key.name.replace("<name>", ANY.get(top, "")).replace("[]", "[0]")
+    return key.name.replace("<name>", any_name(key)).replace("[]", "[0]")
 
 
 @pytest.fixture
@@ -55,7 +70,7 @@ def test_every_key_says_what_it_means_and_every_number_its_unit():
         assert key.meaning, key
         assert bool(key.unit) == number(key), key
         assert key.default, key
-    assert len({key.name for key in KEYS}) == len(KEYS)
+    assert len({(key.name, key.where) for key in KEYS}) == len(KEYS)
 
 
 def leaves(table, prefix=""):
@@ -64,7 +79,7 @@ def leaves(table, prefix=""):
         yield key
         if key in ("joint_groups", "contact.feet"):
             continue
-        if key in ("joints", "jet_models"):
+        if key in ("joints", "jet_models", "frames"):
             for entry in value.values():
                 yield from leaves(entry, f"{key}.<name>.")
         elif isinstance(value, dict):
@@ -95,6 +110,9 @@ def test_a_key_is_missed_where_it_is_required_and_only_there(key, load_changed):
     del place[last]
     if key.default == "required":
         with pytest.raises(ModelError, match=rf"the robot lacks '{re.escape(spelled(key))}'"):
+            load_changed(table)
+    elif key.name == "joints":  # which the groups name
+        with pytest.raises(ModelError, match="joint group 'torso': unknown joint 'torso_pitch'"):
             load_changed(table)
     elif key.name == "jet_models":
         with pytest.raises(ModelError, match="unknown jet model 'P160'"):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from multimodal_to.adam.representation import Representations, checked_representation
-from multimodal_to.adam.tree import Tree
+from multimodal_to.adam.tree import FixedFrame, Tree
 from multimodal_to.adam.urdf import load_tree
 from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, ModelError, shown
@@ -98,7 +98,7 @@ class Library:
 
     @property
     def frame_names(self) -> tuple[str, ...]:
-        """Return the names of all frames: every link of the URDF."""
+        """Return the names of all frames: every link of the URDF, and what `with_frames` added."""
         return tuple(self.tree.frames)
 
     def get_total_mass(self) -> float:
@@ -139,6 +139,16 @@ class Library:
         """
         other = copy.copy(self)
         other._gravity = _checked_gravity(gravity)
+        return other
+
+    def with_frames(self, frames: Mapping[str, FixedFrame]) -> Self:
+        """Return the same robot with more frames, by name; this one keeps its own.
+
+        Raises:
+            ModelError: a frame of that name exists, or the link that it is fixed in does not.
+        """
+        other = copy.copy(self)
+        other.tree = self.tree.with_frames(frames)
         return other
 
     @property

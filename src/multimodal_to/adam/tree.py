@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as cs
 import numpy as np
@@ -95,6 +95,15 @@ class Frame(Value):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class FixedFrame(Value):
+    """A frame that a URDF lacks, fixed in one of its links."""
+
+    link: str
+    rotation: np.ndarray = field(default_factory=lambda: np.eye(3))  # link-from-frame, (3, 3)
+    translation: np.ndarray = field(default_factory=lambda: np.zeros(3))  # of its origin in the link [m], (3,)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Tree(Value):
     """A floating-base robot: body 0 is the base, every other body comes after its parent."""
 
@@ -150,6 +159,27 @@ class Tree(Value):
         rates = dict(zip(self.joint_names, self._of_joints("s_dot", s_dot), strict=True))
         rates |= {name: how.multiplier * rates[how.joint] for name, how in self.followers.items()}
         return rates | {name: np.zeros(s_dot.shape[1:]) for name in self.locked}
+
+    @checked
+    def with_frames(self, frames: Mapping[str, FixedFrame]) -> Tree:
+        """Return the tree with more frames.
+
+        Raises:
+            ModelError: a frame of that name exists, or the link that it is fixed in does not.
+        """
+        if not frames:
+            return self
+        known = dict(self.frames)
+        for name, added in frames.items():
+            if name in self.frames:
+                raise ModelError(f"the frame '{name}' exists already; expected another name")
+            link = self.frame(added.link)
+            known[name] = Frame(
+                body=link.body,
+                rotation=link.rotation @ cs.DM(added.rotation),
+                translation=link.translation + link.rotation @ cs.DM(added.translation),
+            )
+        return replace(self, frames=known)
 
     @checked
     def frame(self, name: str) -> Frame:

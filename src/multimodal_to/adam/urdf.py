@@ -143,7 +143,8 @@ def _root(urdf: str | os.PathLike[str]) -> tuple[Any, str]:
         raise ModelError(f"{source} {_ENTITIES}")
     _drop_namespace(root)
     if root.tag != "robot":
-        raise ModelError(f"{source} is no URDF: its root element is <{root.tag}>, expected <robot>")
+        other = "; MJCF is not read, convert it to a URDF" if root.tag == "mujoco" else ""
+        raise ModelError(f"{source} is no URDF: its root element is <{root.tag}>, expected <robot>{other}")
     if (count := sum(1 for _ in root.iter())) > MOST_ELEMENTS:
         raise ModelError(f"{source} has {count} elements; at most {MOST_ELEMENTS} are read")
     if root.get("name") is None:

@@ -25,11 +25,12 @@ from multimodal_to.auditing.task import task_findings
 from multimodal_to.auditing.thrust import thrust_findings
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.models.contact import FrictionCone
+from multimodal_to.models.jet import Engine, FirstOrder
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.scenarios.data import stored
 from multimodal_to.scenarios.scenario import Scenario
-from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory import Trajectory, rules
 from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.derived import (
     at_knots,
@@ -243,7 +244,7 @@ def _dynamics(motion: Motion) -> list[Worst]:
     acting = np.concatenate([contacts, motion.thrusts])
     points = np.concatenate([motion.points, motion.thrust_points])
     linear = acting.sum(axis=0) + robot.mass * robot.gravity - robot.mass * at_knots(trajectory, "com_acceleration").T
-    moments = np.cross(points - trajectory.com_position.T, acting).sum(axis=0)
+    moments = np.cross(points - trajectory.com_position.T, acting).sum(axis=0) + motion.drag_moments.sum(axis=0)
     turning = moments.T - at_knots(trajectory, "angular_momentum_rate")
     return [
         worst_of("force balance", _followed(largest(linear.T), trajectory)),
@@ -299,12 +300,36 @@ def _rodrigues(vectors: Array) -> Array:
 
 
 def _jets(robot: Robot, trajectory: Trajectory) -> list[Worst]:
+    """How far thrusts are from the laws of their engines: T̈ of those of order two; of others, see `_lags`."""
     rate, throttle = at_knots(trajectory, "thrust_rate"), at_knots(trajectory, "throttle")
     accelerations = np.array(
-        [jet.model.acceleration(trajectory.thrust[row], rate[row], throttle[row]) for row, jet in enumerate(robot.jets)]
+        [jet.model.slopes(trajectory.thrust[row], rate[row], throttle[row])[1] for row, jet in enumerate(robot.jets)]
     ).reshape(len(robot.jets), trajectory.time.size)
-    residuals = np.abs(accelerations - at_knots(trajectory, "thrust_acceleration"))
-    return [worst_of("thrust dynamics", _followed(residuals, trajectory), robot.jet_names)]
+    residuals = _followed(np.abs(accelerations - at_knots(trajectory, "thrust_acceleration")), trajectory)
+    for row, jet in enumerate(robot.jets):
+        if jet.model.order < 2:
+            residuals[row, :] = 0.0
+            residuals[row, : trajectory.knots] = _lags(jet.model, trajectory, row)
+    return [worst_of("thrust dynamics", residuals, robot.jet_names)]
+
+
+def _lags(engine: Engine, trajectory: Trajectory, row: int) -> Array:
+    """Return how far a thrust is from its engine's law over each interval, as a T̈ [N/s²], (knots,).
+
+    For an engine of order one it is Ṫ less (k u − T) / τ over τ; for one of order none, T less that of the throttle at
+    the interval's end, over Δt².
+
+    Args:
+        engine: of order one or none.
+        trajectory: the motion.
+        row: of the jet.
+    """
+    missing = engine.imbalance(trajectory.thrust[row], trajectory.throttle[row])
+    if isinstance(engine, FirstOrder):
+        share = rules.acts_after(trajectory.rule)
+        wanted = share * missing[:-1] + (1.0 - share) * missing[1:]
+        return np.asarray(np.abs(trajectory.thrust_rate[row, 1:] - wanted) / engine.time_constant)
+    return np.asarray(np.abs(missing[1:]) / np.diff(trajectory.time) ** 2)
 
 
 def _contacts(motion: Motion, scenario: Scenario | None) -> list[Worst]:

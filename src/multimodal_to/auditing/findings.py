@@ -64,6 +64,12 @@ class Motion:
         )
 
     @property
+    def drag_moments(self) -> Array:
+        """Return the moments of the rotors' drag on the robot [N m], (jets, knots + 1, 3)."""
+        drags = [jet.drag for jet in self.robot.with_jets(self.trajectory.jet_names).jets]
+        return np.asarray(np.reshape(drags, (-1, 1, 1)) * self.thrusts)
+
+    @property
     def contact_forces(self) -> Array:
         """Return the contact forces [N], (contacts, knots + 1, 3)."""
         return self.trajectory.per_contact("contact_forces").transpose(0, 2, 1)

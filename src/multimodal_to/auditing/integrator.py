@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Motion, Worst, worst_of
 from multimodal_to.models.attitude import continuous
+from multimodal_to.models.jet import FirstOrder, StaticMap
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory, rules
 
@@ -87,6 +88,7 @@ class Controls:
     points: Array  # p_i, the contact points [m], (instants, contacts, 3)
     jets: Array  # r_j, the jets from the CoM, base axes [m], (instants, jets, 3)
     directions: Array  # of the thrusts, base axes [1], (instants, jets, 3)
+    drags: Array  # moment of each rotor for each newton of its thrust [m], (jets,)
     inertia_inverse: Array  # I⁻¹ about the CoM, base axes [1/(kg m²)], (instants, 3, 3)
     joint_momentum: Array  # A ṡ, of the joints' motion alone, base axes [kg m²/s], (instants, 3)
 
@@ -100,7 +102,9 @@ class Controls:
                 controls change in the middle of an interval and the number is odd.
         """
         robot, trajectory, kindyn = motion.robot, motion.trajectory, motion.robot.kindyn
-        steps = steps or max(1, int(np.ceil(np.diff(trajectory.time).max() / _LARGEST_STEP - 1e-9)))
+        lags = [jet.model.time_constant for jet in robot.jets if isinstance(jet.model, FirstOrder)]
+        longest = min([_LARGEST_STEP, *lags])
+        steps = steps or max(1, int(np.ceil(np.diff(trajectory.time).max() / longest - 1e-9)))
         steps += steps % 2 if rules.acts_after(trajectory.rule) else 0
         instants = _instants(trajectory.time, 2 * steps)
         count, jets = instants.size, len(robot.jets)
@@ -121,6 +125,7 @@ class Controls:
             points=points.reshape(count, -1, 3),
             jets=poses[:, :, :3, 3] - com[:, None],
             directions=-poses[:, :, :3, 2],
+            drags=np.array([jet.drag for jet in robot.jets]),
             inertia_inverse=np.linalg.pinv(angular[:, :, 3:6], hermitian=True),
             joint_momentum=np.einsum("kij,kj->ki", angular[:, :, 6:], velocities),
         )
@@ -160,23 +165,27 @@ class Controls:
             columns: of the file with the contact forces and throttles that act on each, (states,).
         """
         robot, plan, jets = self.robot, self.trajectory, len(self.robot.jets)
-        thrust, rate = states[:, _THRUSTS : _THRUSTS + jets], states[:, _THRUSTS + jets :]
+        thrust, rate = states[:, _THRUSTS : _THRUSTS + jets].copy(), states[:, _THRUSTS + jets :]
+        for row, jet in enumerate(robot.jets):
+            if isinstance(jet.model, StaticMap):
+                thrust[:, row] = jet.model.thrust(plan.throttle[row, columns])
         rotation = rotations(states[:, _RHO])
         contacts = plan.contact_forces.reshape(len(robot.contacts), 3, plan.time.size).transpose(2, 0, 1)[columns]
         thrusts = thrust[:, :, None] * np.einsum("sij,scj->sci", rotation, self.directions[instants])
         arms = np.einsum("sij,scj->sci", rotation, self.jets[instants])
         acceleration = robot.gravity + (contacts.sum(axis=1) + thrusts.sum(axis=1)) / robot.mass
         moment = np.cross(self.points[instants] - states[:, None, _X], contacts).sum(axis=1)
-        moment = moment + np.cross(arms, thrusts).sum(axis=1)
+        moment = moment + (np.cross(arms, thrusts) + self.drags[:, None] * thrusts).sum(axis=1)
         within = np.einsum("sji,sj->si", rotation, states[:, _H]) - self.joint_momentum[instants]
         turn = np.einsum("sij,sj->si", self.inertia_inverse[instants], within)
         omega = np.einsum("sij,sj->si", rotation, turn)
         vector, scalar = states[:, 9:12], states[:, 12:13]
         turning = 0.5 * np.hstack([scalar * omega + np.cross(omega, vector), -(omega * vector).sum(1, keepdims=True)])
-        spooling = np.zeros_like(thrust)
+        spooling, slope = np.zeros_like(thrust), np.zeros_like(thrust)
         for row, jet in enumerate(robot.jets):
-            spooling[:, row] = jet.model.acceleration(thrust[:, row], rate[:, row], plan.throttle[row, columns])
-        return np.hstack([states[:, _V], acceleration, moment, turning, rate, spooling])
+            slopes = jet.model.slopes(thrust[:, row], rate[:, row], plan.throttle[row, columns])
+            slope[:, row], spooling[:, row] = slopes
+        return np.hstack([states[:, _V], acceleration, moment, turning, slope, spooling])
 
     def advanced(self, states: Array, intervals: Indices) -> Array:
         """Return states after an interval each, by the method of Runge and Kutta of order four.

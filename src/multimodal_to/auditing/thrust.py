@@ -7,6 +7,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.auditing.findings import Worst, worst_of
+from multimodal_to.models.jet import StaticMap
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory, rules
 
@@ -14,7 +15,7 @@ _TOLERANCE = 1e-8  # of the integrator, relative and absolute
 
 
 def thrust_findings(robot: Robot, trajectory: Trajectory) -> list[Worst]:
-    """Compare the thrusts with those that T̈ = f + g gives for the same throttles, integrated by CVODES.
+    """Compare the thrusts with those that their engines' laws give for the same throttles, integrated by CVODES.
 
     The throttle of an interval is that which its end holds. Under leapfrog a throttle acts from half an interval before
     its knot to half an interval after it: there the interval has the throttle of its start in its first half, and that
@@ -34,6 +35,9 @@ def thrust_findings(robot: Robot, trajectory: Trajectory) -> list[Worst]:
             if share:
                 parameters = np.append(throttles[:, column], share * dt)
                 state, end = _advance(step, state, parameters), _advance(step, end, parameters)
+        for row, jet in enumerate(robot.jets):
+            if isinstance(jet.model, StaticMap):
+                state[row] = end[row] = jet.model.thrust(throttles[row, index + 1])
         alone[:, index] = end[:count] - trajectory.thrust[:, index + 1]
         through[:, index] = state[:count] - trajectory.thrust[:, index + 1]
     names = robot.jet_names
@@ -47,7 +51,7 @@ def _rates(robot: Robot, trajectory: Trajectory) -> Array:
     """Return Ṫ of each jet at the knots [N/s], (jets, knots + 1)."""
     rates, time = trajectory.thrust_rate, trajectory.time
     accelerations = [
-        jet.model.acceleration(trajectory.thrust[row], rates[row], trajectory.throttle[row])
+        jet.model.slopes(trajectory.thrust[row], rates[row], trajectory.throttle[row])[1]
         for row, jet in enumerate(robot.jets)
     ]
     return np.asarray(rates + (time - trajectory.times("thrust_rate")) * np.array(accelerations))
@@ -74,10 +78,10 @@ def _integrator(robot: Robot) -> cs.Function:
     count = len(robot.jets)
     thrust, rate, throttle = (cs.SX.sym(name, count) for name in ("thrust", "rate", "throttle"))
     dt = cs.SX.sym("dt")
-    accelerations = [jet.model.acceleration(thrust[i], rate[i], throttle[i]) for i, jet in enumerate(robot.jets)]
+    slopes = [jet.model.slopes(thrust[i], rate[i], throttle[i]) for i, jet in enumerate(robot.jets)]
     problem = {
         "x": cs.vertcat(thrust, rate),
         "p": cs.vertcat(throttle, dt),
-        "ode": dt * cs.vertcat(rate, *accelerations),  # over one unit of time
+        "ode": dt * cs.vertcat(*(one[0] for one in slopes), *(one[1] for one in slopes)),  # over one unit of time
     }
     return cs.integrator("thrusts", "cvodes", problem, 0.0, 1.0, {"abstol": _TOLERANCE, "reltol": _TOLERANCE})

@@ -1,9 +1,8 @@
-"""`audit`, `simulate` and `robot info`."""
+"""`audit` and `simulate`."""
 
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,18 +11,13 @@ import typer
 from rich.table import Column, Table
 from rich.text import Text
 
-from multimodal_to.adam.inspection import describe
 from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.cli.common import File, RobotOption, app, described, loaded, number_option, out, writable
-from multimodal_to.cli.completion import robots_or_urdfs
 from multimodal_to.cli.streams import print_json
 from multimodal_to.errors import OutputError
-from multimodal_to.models.robot import load_robot
 from multimodal_to.trajectory.conditions import differences
 
 _SAID = 5  # so many differences of robots are printed
-robot_app = typer.Typer(help="Look at robots.", no_args_is_help=True)
-app.add_typer(robot_app, name="robot")
 
 
 @app.command("audit")
@@ -168,24 +162,3 @@ def simulate(
     )
     out.print(f"wrote {simulation.simulated_trajectory(playback).save(target)}", soft_wrap=True)
     raise typer.Exit(0 if outcome.end in ("stands", "hovers") else 1)
-
-
-@robot_app.command("info")
-def robot_info(
-    path: Annotated[
-        str,
-        typer.Argument(
-            help="URDF file, a robot's folder, or the name of a bundled robot.", autocompletion=robots_or_urdfs
-        ),
-    ],
-) -> None:
-    """Show a robot's tree, masses and frames, what was merged or locked, and what looks wrong.
-
-    Example: multimodal-to robot info ironcub
-    """
-    if os.path.isfile(path):
-        description = describe(path)
-    else:
-        the_robot = load_robot(path)
-        description = describe(the_robot.urdf, the_robot.joint_names)
-    out.print(str(description), markup=False, soft_wrap=True)

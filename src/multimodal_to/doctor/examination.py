@@ -74,7 +74,7 @@ def doctor(
         return refusal("keyframes", cause, "name what the robot has, and ask for one thing at a knot")
     except (TrajectoryError, InputError) as cause:
         return refusal("initial_state", cause, "name a trajectory file of this robot")
-    if not robot.contacts:
+    if not robot.contacts and (task.stands_at_start or task.stands_at_end):
         return refusal("contacts", f"{robot.name} has no contact points to stand on", "name some in its robot.toml")
     findings = [finding for check in CHECKS for finding in check(task)]
     diagnosis = Diagnosis(findings=tuple(findings))

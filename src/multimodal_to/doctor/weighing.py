@@ -109,10 +109,9 @@ def scales(task: Task) -> Iterator[Symptom]:
     """Compare what the robot's variables will be with the sizes that the solver takes for one."""
     robot, scenario = task.robot, task.scenario
     known = {variable.name: variable.scale for variable in task.formulation.variables}
-    expected = {
-        "contact_forces": robot.weight / len(robot.contacts),
-        "com_position": float(np.abs([scenario.start_com, scenario.end_com]).max()),
-    }
+    expected = {"com_position": float(np.abs([scenario.start_com, scenario.end_com]).max())}
+    if robot.contacts:
+        expected = {"contact_forces": robot.weight / len(robot.contacts), **expected}
     if robot.jets and task.hovers:
         expected["thrust"] = robot.weight / len(robot.jets)
     for name, size in expected.items():

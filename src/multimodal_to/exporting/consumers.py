@@ -87,7 +87,8 @@ def _torques(robot: Robot, trajectory: Trajectory, names: tuple[str, ...]) -> Ar
     if set(names) != set(own):
         for how in robot.kindyn.tree.followers.values():
             own.pop(how.joint, None)  # it moves its followers as well
-        whole = replace(robot, kindyn=KinDynComputations(_without_mimics(robot), names, gravity=robot.gravity))
+        kindyn = KinDynComputations(_without_mimics(robot), names, gravity=robot.gravity)
+        whole = replace(robot, kindyn=kindyn.with_frames(robot.added_frames))
         positions, velocities = of_all_joints(robot, trajectory, names)
         motion = replace(trajectory, joint_names=names, joint_positions=positions, joint_velocities=velocities)
         own = dict(zip(names, joint_torques(whole, motion), strict=True)) | own

@@ -90,7 +90,17 @@ def _within(kind: Any, name: str, where: str, unions: Unions) -> Iterator[Key]:
     elif get_origin(kind) is tuple and is_dataclass(get_args(kind)[0]):
         yield from _keys(get_args(kind)[0], f"{name}[].", where, unions)
     elif get_origin(kind) is Mapping:
-        yield from _within(get_args(kind)[1], f"{name}.<name>", where, unions)
+        inner = get_args(kind)[1]
+        if inner in unions:
+            kinds = tuple(unions[inner])
+            yield Key(
+                name=f"{name}.<name>.kind",
+                kind=f"one of {', '.join(kinds)}",
+                unit="",
+                default=kinds[0],
+                meaning="Which one it is",
+            )
+        yield from _within(inner, f"{name}.<name>", where, unions)
 
 
 def field_texts(record: type) -> dict[str, str]:

@@ -10,7 +10,8 @@ msgspec takes unknown keys of a dataclass for good, and its errors keep back the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from enum import Enum
 from types import UnionType
@@ -23,10 +24,13 @@ Record = TypeVar("Record")
 Unions = Mapping[Any, Mapping[str, type]]
 """The classes that may stand for a type, by their `kind`; none of them is the type of a field on its own."""
 
+_NAMED = 20
+"""So many faults are named at once."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Records:
-    """Reads records of one sort of file; every error is one sentence that names the key and what was expected."""
+    """Reads records of one sort of file; an error names every key that is wrong and what was expected."""
 
     what: str  # what lacks a key in an error, such as "the scenario"
     error: type[MultimodalError]
@@ -78,15 +82,16 @@ class Records:
         if not isinstance(table, Mapping):
             raise self._wrong(where, table, "a table")
         prefix, hints = f"{where}." if where else "", get_type_hints(kind)
-        for key in table:
-            if key not in hints:
-                raise self.error(unknown("key", prefix + key, [prefix + name for name in (*hints, *also)]))
+        strange = [key for key in table if key not in hints][:_NAMED]
+        faults = [unknown("key", prefix + key, [prefix + name for name in (*hints, *also)]) for key in strange]
         values: dict[str, Any] = {entry.name: getattr(base, entry.name) for entry in fields(kind)} if base else {}
-        for key, value in table.items():
-            values[key] = self.value(hints[key], value, prefix + key, values.get(key))
+        for key in (key for key in table if key in hints):
+            with self._noted(faults):
+                values[key] = self.value(hints[key], table[key], prefix + key, values.get(key))
         needed = [entry.name for entry in fields(kind) if entry.default is MISSING and entry.default_factory is MISSING]
-        if missing := [f"'{prefix}{name}'" for name in needed if name not in values]:
-            raise self.error(f"{self.what} lacks {', '.join(missing)}")
+        if missing := [f"'{prefix}{name}'" for name in needed if name not in values and name not in table]:
+            faults.append(f"{self.what} lacks {', '.join(missing)}")
+        self._refuse(faults)
         try:
             return kind(**values)
         except InputError as error:
@@ -134,11 +139,13 @@ class Records:
         if get_origin(kind) is Mapping:
             if not isinstance(value, Mapping):
                 raise self._wrong(key, value, "a table")
-            inner = get_args(kind)[1]
-            return {
-                **(base or {}),
-                **{name: self.value(inner, entry, f"{key}.{name}", None) for name, entry in value.items()},
-            }
+            inner, made = get_args(kind)[1], dict(base or {})
+            faults: list[str] = []
+            for name, entry in value.items():
+                with self._noted(faults):
+                    made[name] = self.value(inner, entry, f"{key}.{name}", None)
+            self._refuse(faults)
+            return made
         if issubclass(kind, Enum):
             members = {member.value: member for member in kind}
             if not isinstance(value, str) or value not in members:
@@ -152,10 +159,13 @@ class Records:
         kinds = [members[0]] * len(value) if members[-1] is Ellipsis else list(members)
         if len(value) != len(kinds):
             raise self._wrong(key, value, f"a list of {len(kinds)}")
-        return tuple(
-            self.value(kind, entry, f"{key}[{index}]", None)
-            for index, (kind, entry) in enumerate(zip(kinds, value, strict=True))
-        )
+        faults: list[str] = []
+        made = []
+        for index, (kind, entry) in enumerate(zip(kinds, value, strict=True)):
+            with self._noted(faults):
+                made.append(self.value(kind, entry, f"{key}[{index}]", None))
+        self._refuse(faults)
+        return tuple(made)
 
     def _scalar(self, kind: Any, value: Any, key: str) -> Any:
         if kind is float:
@@ -166,6 +176,20 @@ class Records:
         if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
             raise self._wrong(key, value, expected)
         return value
+
+    @contextmanager
+    def _noted(self, faults: list[str]) -> Iterator[None]:
+        """Take an error down, so that the next key is read as well: one run names all that is wrong."""
+        try:
+            yield
+        except self.error as error:
+            faults.append(str(error))
+            if len(faults) > _NAMED:
+                self._refuse(faults)
+
+    def _refuse(self, faults: list[str]) -> None:
+        if faults:
+            raise self.error("; ".join(faults))
 
     def _wrong(self, key: str, value: Any, expected: str) -> MultimodalError:
         return self.error(f"'{key}' is {shown(value)}; expected {expected}")

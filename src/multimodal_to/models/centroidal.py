@@ -28,3 +28,14 @@ def momentum_rate(mass: float, gravity: SX, com: SX, forces: Iterable[tuple[SX, 
 def thrust_force(rotation: SX, thrust: SX) -> SX:
     """Return the force of a jet [N], (3, 1): R (0, 0, −T), along −z of its frame (eq. 5)."""
     return -rotation[:, 2] * thrust
+
+
+def drag_moment(rotation: SX, thrust: SX, drag: float) -> SX:
+    """Return the moment of a rotor's drag on the robot [N m], (3, 1): R (0, 0, −κ T), along the thrust.
+
+    Args:
+        rotation: of the jet's frame, (3, 3).
+        thrust: T [N].
+        drag: κ [m].
+    """
+    return -rotation[:, 2] * (drag * thrust)

@@ -9,27 +9,31 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import casadi as cs
 import numpy as np
 
 from multimodal_to.adam import KinDynComputations, quaternion
 from multimodal_to.adam.inspection import is_placeholder
-from multimodal_to.adam.spatial import Array
+from multimodal_to.adam.spatial import Array, rotation_from_rpy
+from multimodal_to.adam.tree import FixedFrame
+from multimodal_to.adam.urdf import read_urdf
 from multimodal_to.arguments import check_fields, checked, vector
 from multimodal_to.errors import ModelError, MultimodalError, listed, unknown
+from multimodal_to.files.packages import ROOT_VARIABLES, package_file, package_folders
 from multimodal_to.files.reading import read_toml
 from multimodal_to.files.records import Records
 from multimodal_to.models import attitude, capsule_pairs, proportions
 from multimodal_to.models.capsule import Capsule, CapsulePair, plume
 from multimodal_to.models.contact import ContactPoint
-from multimodal_to.models.jet import Jet
+from multimodal_to.models.jet import ENGINES, Jet
 from multimodal_to.models.proportions import Gait
-from multimodal_to.models.robot_keys import JetTable, JointTable, RobotFile
+from multimodal_to.models.robot_keys import UNIONS, JetTable, JointTable, RobotFile
 from multimodal_to.values import FrozenMapping, Value
 
 ROBOT_FILE = "robot.toml"
-_RECORDS = Records(what="the robot", error=ModelError)
+_RECORDS = Records(what="the robot", error=ModelError, unions=UNIONS)
 NamePairs = frozenset[frozenset[str]]
 """Pairs of capsules by their names."""
 
@@ -106,6 +110,8 @@ class Robot(Value):
     held_pairs: NamePairs = frozenset()  # of capsules that a problem holds apart; empty: `near_capsule_pairs` chooses
     lean_xyzw: Array = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
     """Rotation from upright to home in the base's axes, (4,): ρ_home = ρ_upright ∘ lean."""
+    added_frames: Mapping[str, FixedFrame] = field(default_factory=lambda: FrozenMapping({}))
+    """Frames that the URDF lacks, by name; `kindyn` has them."""
 
     def __post_init__(self) -> None:
         for name, size in (("contact_reach", 3), ("jet_reach", 3), ("lean_xyzw", 4)):
@@ -278,9 +284,10 @@ class Robot(Value):
 def bundled_robots() -> dict[str, Path]:
     """Return the folders of the robots that come with the library, by name."""
     package = Path(__file__).parents[1]
-    inside = package / "robots"  # in an installed wheel; a checkout keeps them beside src/
-    folder = inside if inside.is_dir() else package.parents[1] / "robots"
-    return {path.parent.name: path.parent for path in sorted(folder.glob(f"*/{ROBOT_FILE}"))}
+    for folder in (package / "robots", package.parents[1] / "robots"):  # in a wheel; a checkout has them beside src/
+        if found := {path.parent.name: path.parent for path in sorted(folder.glob(f"*/{ROBOT_FILE}"))}:
+            return found
+    return {}
 
 
 @checked
@@ -297,26 +304,29 @@ def load_robot(robot: str | os.PathLike[str]) -> Robot:
     path = folder / ROBOT_FILE
     table = read_toml(path, ModelError)
     try:
-        return _robot(_RECORDS.read(RobotFile, table), folder)
+        return _robot(_RECORDS.read(RobotFile, _with_kinds(table)), folder)
     except MultimodalError as error:
         raise ModelError(f"{path}: {error}") from error
 
 
+def _with_kinds(table: dict[str, Any]) -> dict[str, Any]:
+    """Return the table of a file with the kind of each jet model said: the first where it is not."""
+    models = table.get("jet_models")
+    if not isinstance(models, dict):
+        return table
+    kind = {"kind": next(iter(ENGINES))}
+    return {**table, "jet_models": {name: kind | of if isinstance(of, dict) else of for name, of in models.items()}}
+
+
 def _robot(file: RobotFile, folder: Path) -> Robot:
-    urdf, joint_names = folder / file.urdf, tuple(file.joints)
-    if os.path.isabs(file.urdf) or Path(os.path.normpath(file.urdf)).parts[:1] in ((), ("..",)):  # a link may lead out
-        raise ModelError(f"'urdf' is '{file.urdf}', which is outside the robot's folder; expected a path inside it")
-    kindyn = KinDynComputations(urdf, joint_names)
-    _check_groups(file)
+    urdf = _urdf(file.urdf, folder)
+    _refuse_faults(file, urdf)
+    frames = _added_frames(file)
+    kindyn = KinDynComputations(urdf, tuple(file.joints)).with_frames(frames)
     contacts = tuple(
         ContactPoint(frame=frame, foot=foot) for foot, frames in file.contact.feet.items() for frame in frames
     )
     home, links = _home(file), _link_capsules(file)
-    _refuse_repeated("contact point", [point.frame for point in contacts])
-    _refuse_repeated("jet", [jet.name for jet in file.jet])
-    frames = [*(point.frame for point in contacts), *(jet.frame for jet in file.jet), *(link.frame for link in links)]
-    for frame in frames:
-        kindyn.tree.frame(frame)
     jets = _jets(file, kindyn, home)
     contact_reach, jet_reach, gait = _proportions(file, kindyn, home)
     return Robot(
@@ -336,20 +346,115 @@ def _robot(file: RobotFile, folder: Path) -> Robot:
         ignored_pairs=_named_pairs("ignore", file.collision.ignore, links, jets),
         held_pairs=_named_pairs("hold_apart", file.collision.hold_apart, links, jets),
         lean_xyzw=_unit(file.home.lean_xyzw),
+        added_frames=FrozenMapping(frames),
     )
 
 
-def _check_groups(file: RobotFile) -> None:
+def _urdf(address: str, folder: Path) -> Path:
+    """Return the URDF that a robot's file names: inside its folder, where it may be a link, or in a package.
+
+    Raises:
+        ModelError: it is not found, or outside.
+    """
+    scheme, found, inside = address.partition("://")
+    if found:
+        return _in_package(address, scheme, inside, folder)
+    if os.path.isabs(address) or Path(os.path.normpath(address)).parts[:1] in ((), ("..",)):  # a link may lead out
+        raise ModelError(
+            f"'urdf' is '{address}', which is outside the robot's folder; expected a path inside it, where a link may "
+            "lie, or package://NAME/PATH"
+        )
+    return folder / address
+
+
+def _in_package(address: str, scheme: str, inside: str, folder: Path) -> Path:
+    name, _, path = inside.partition("/")
+    path = os.path.normpath(path.replace("\\", "/")).lstrip("/") if path else ""
+    if scheme not in ("package", "model") or not path or path.split("/", 1)[0] in ("..", "."):
+        raise ModelError(f"'urdf' is '{address}'; expected a path inside the robot's folder, or package://NAME/PATH")
+    folders = [root for root in package_folders(name, folder.absolute() / ROBOT_FILE) if root.is_dir()]
+    for root in folders:
+        if (root / path).is_file():
+            return root / path
+    if (installed := package_file(name, path)) is not None:
+        return installed
+    if folders:
+        raise ModelError(f"'urdf' is '{address}', and the folder '{folders[0]}' has no '{path}'")
+    raise ModelError(
+        f"'urdf' is '{address}', which is not found: no folder '{name}' lies beside the robot's folder, above it or in "
+        f"{', '.join(ROOT_VARIABLES)}, and no package '{name}' with this file is installed"
+    )
+
+
+def _refuse_faults(file: RobotFile, urdf: Path) -> None:
+    """Refuse a file that names what does not exist, or twice; all of it is named at once.
+
+    Raises:
+        ModelError: it does, or the URDF cannot be read.
+    """
+    links, joints = read_urdf(urdf)
+    movable = [joint.name for joint in joints if joint.kind != "fixed"]
+    faults = [unknown("joint", name, movable) for name in file.joints if name not in movable]
+    strange: dict[str, str] = {}  # a joint's first group
     for group, members in file.joint_groups.items():
-        for member in members:
-            if member not in file.joints:
-                raise ModelError(f"joint group '{group}': {unknown('joint', member, file.joints)}")
-        _refuse_repeated(f"joint group '{group}': joint", members)
+        for member in (member for member in members if member not in file.joints):
+            strange.setdefault(member, group)
+        faults += _repeated(f"joint group '{group}': joint", members)
+    faults += [f"joint group '{group}': {unknown('joint', name, file.joints)}" for name, group in strange.items()]
+    names = [link.name for link in links]
+    faults += [
+        f"'frames.{name}': {unknown('link', of.link, names)}"
+        for name, of in file.frames.items()
+        if of.link not in names
+    ]
+    faults += [f"the frame '{name}' exists already; expected another name" for name in file.frames if name in names]
+    known = dict.fromkeys((*names, *file.frames))
+    contacts = [frame for frames in file.contact.feet.values() for frame in frames]
+    used = (*contacts, *(jet.frame for jet in file.jet), *(capsule.link for capsule in file.capsule))
+    faults += [unknown("frame", frame, known) for frame in dict.fromkeys(used) if frame not in known]
+    faults += _repeated("contact point", contacts) + _repeated("jet", [jet.name for jet in file.jet])
+    models = dict.fromkeys(jet.model for jet in file.jet if jet.model not in file.jet_models)
+    faults += [unknown("jet model", model, file.jet_models) for model in models]
+    if faults:
+        raise ModelError("; ".join(faults))
 
 
-def _refuse_repeated(kind: str, names: Sequence[str]) -> None:
-    if repeated := [name for name, count in Counter(names).items() if count > 1]:
-        raise ModelError(f"{kind} given twice: {listed(repeated)}")
+def _repeated(kind: str, names: Sequence[str]) -> list[str]:
+    repeated = [name for name, count in Counter(names).items() if count > 1]
+    return [f"{kind} given twice: {listed(repeated)}"] if repeated else []
+
+
+def _added_frames(file: RobotFile) -> dict[str, FixedFrame]:
+    """Return the frames that the file adds, and one for each jet whose thrust is not along −z of the frame it names."""
+    added = {
+        name: FixedFrame(
+            link=frame.link, rotation=rotation_from_rpy(*frame.rpy), translation=np.array(frame.position, dtype=float)
+        )
+        for name, frame in file.frames.items()
+    }
+    for jet in file.jet:
+        if _thrust_frame(jet) != jet.frame:
+            turn = _turn_to(-np.array(jet.thrust_axis))
+            under = added.get(jet.frame, FixedFrame(link=jet.frame))
+            added[_thrust_frame(jet)] = FixedFrame(
+                link=under.link, rotation=under.rotation @ turn, translation=under.translation
+            )
+    return added
+
+
+def _thrust_frame(jet: JetTable) -> str:
+    """Return the frame whose −z is the direction of a jet's thrust."""
+    x, y, z = jet.thrust_axis
+    return jet.frame if x == y == 0 and z < 0 else f"{jet.frame} thrust of {jet.name}"
+
+
+def _turn_to(direction: Array) -> Array:
+    """Return the smallest rotation that brings z to a direction, (3, 3)."""
+    z = direction / np.linalg.norm(direction)
+    if z[2] < -1 + 1e-12:
+        return np.diag([1.0, -1.0, -1.0])
+    skew = np.array([[0.0, 0.0, z[0]], [0.0, 0.0, z[1]], [-z[0], -z[1], 0.0]])  # of e_z × z
+    return np.asarray(np.eye(3) + skew + skew @ skew / (1.0 + z[2]))
 
 
 def _limits(file: RobotFile, kindyn: KinDynComputations) -> JointLimits:
@@ -424,10 +529,10 @@ def _named_pairs(
         jets: whose plumes are capsules too.
     """
     names = [capsule.name for capsule in (*links, *(jet.plume for jet in jets if jet.plume is not None))]
-    _refuse_repeated("capsule", names)
-    for name in (name for pair in pairs for name in pair):
-        if name not in names:
-            raise ModelError(f"'collision.{key}': {unknown('capsule', name, names)}")
+    strange = dict.fromkeys(name for pair in pairs for name in pair if name not in names)
+    faults = _repeated("capsule", names) + [f"'collision.{key}': {unknown('capsule', name, names)}" for name in strange]
+    if faults:
+        raise ModelError("; ".join(faults))
     return frozenset(frozenset(pair) for pair in pairs)
 
 
@@ -441,17 +546,16 @@ def _jets(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> tuple[J
     """
     jets = []
     for entry in file.jet:
-        if entry.model not in file.jet_models:
-            raise ModelError(unknown("jet model", entry.model, file.jet_models))
         jets.append(
             Jet(
                 name=entry.name,
-                frame=entry.frame,
+                frame=_thrust_frame(entry),
                 model=file.jet_models[entry.model],
                 thrust_max=entry.thrust_max,
                 throttle_min=entry.throttle[0],
                 throttle_max=entry.throttle[1],
                 plume=_plume(entry, file, kindyn, home),
+                drag=entry.drag,
             )
         )
     return tuple(jets)
@@ -462,7 +566,7 @@ def _plume(entry: JetTable, file: RobotFile, kindyn: KinDynComputations, home: P
         return None
     length = _standing_height(file, kindyn, home) if entry.plume_length is None else entry.plume_length
     radius = proportions.PLUME_RADIUS * length if entry.plume_radius is None else entry.plume_radius
-    return plume(f"{entry.name} plume", entry.frame, length, radius)
+    return plume(f"{entry.name} plume", _thrust_frame(entry), length, radius)
 
 
 def _standing_height(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> float:

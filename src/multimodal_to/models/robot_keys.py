@@ -10,7 +10,7 @@ import numpy as np
 from multimodal_to.adam.inspection import EFFORT_PLACEHOLDER, is_placeholder
 from multimodal_to.errors import InputError, shown
 from multimodal_to.files.keys import Key, keys_of
-from multimodal_to.models.jet import JetModel
+from multimodal_to.models.jet import ENGINES, Engine
 from multimodal_to.models.proportions import SWING
 
 Vector3 = tuple[float, float, float]
@@ -66,11 +66,27 @@ class ContactTable:
 
     friction: float
     """Coefficient of friction between contact points and ground; a scenario may state another [1]."""
-    feet: Mapping[str, tuple[str, ...]]
+    feet: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """The frames that may touch the ground, by foot; their order is that of the contact points."""
 
     def __post_init__(self) -> None:
         _positive("friction", self.friction)
+
+
+def _no_contact() -> ContactTable:
+    return ContactTable(friction=1.0)  # nothing slides that does not touch
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameTable:
+    """A frame of `[frames]`."""
+
+    link: str
+    """The link that it is fixed in."""
+    position: Vector3 = (0.0, 0.0, 0.0)
+    """Its origin in the frame of `link` [m]."""
+    rpy: Vector3 = (0.0, 0.0, 0.0)
+    """Its rotation in the frame of `link`, as a URDF writes it: roll, pitch and yaw, R = Rz Ry Rx [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,15 +130,20 @@ class JetTable:
     name: str
     """What the jet is called."""
     frame: str
-    """The frame that it sits in; its thrust acts along −z of this frame."""
+    """The frame that it sits in; its thrust acts at the origin, along `thrust_axis`."""
     model: str
     """Which of `jet_models` it is."""
     thrust_max: float
     """Greatest thrust [N]."""
     throttle: tuple[float, float]
     """Least and greatest throttle [%]."""
+    thrust_axis: Vector3 = (0.0, 0.0, -1.0)
+    """Direction of the thrust on the robot, in the frame; of any length but zero [1]."""
+    drag: float = 0.0
+    """Moment of a rotor's drag on the robot for each newton of thrust [m], right-handed about `thrust_axis`: positive
+    for a rotor that turns clockwise, seen from where the thrust points to."""
     plume_length: float | None = None
-    """How far the exhaust reaches from the frame's origin, along +z of the frame [m]. A jet has a plume where this or
+    """How far the exhaust reaches from the frame's origin, against the thrust [m]. A jet has a plume where this or
     `plume_radius` is stated. Where only that one is, the length is L: heat and size of a jet grow with its robot."""
     plume_radius: float | None = None
     """Radius of the exhaust [m]. Where only `plume_length` is stated, it is a tenth of it, as wide as a free round jet
@@ -130,6 +151,8 @@ class JetTable:
 
     def __post_init__(self) -> None:
         _positive("thrust_max", self.thrust_max)
+        if not any(self.thrust_axis):
+            raise InputError("thrust_axis is zero; expected a direction")
         for name, size in (("plume_length", self.plume_length), ("plume_radius", self.plume_radius)):
             if size is not None:
                 _positive(name, size)
@@ -174,15 +197,18 @@ class RobotFile:
     name: str
     """What the robot is called."""
     urdf: str
-    """Path of the URDF, from the robot's folder and inside it."""
-    joints: Mapping[str, JointTable]
-    """The joints that move, by their names in the URDF, in the order of s. Mimic joints follow; all others stay at
-    zero."""
-    joint_groups: Mapping[str, tuple[str, ...]]
-    """Names for sets of joints, which weights of a scenario refer to."""
+    """Path of the URDF, from the robot's folder and inside it, where a link may lie; or `package://NAME/PATH`, a file
+    of an installed package or of a folder NAME beside or above."""
     home: HomeTable
     """The home posture, together with the joints' own; postures are searched near it."""
-    contact: ContactTable
+    joints: Mapping[str, JointTable] = field(default_factory=dict)
+    """The joints that move, by their names in the URDF, in the order of s. Mimic joints follow; all others stay at
+    zero."""
+    joint_groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Names for sets of joints, which weights of a scenario refer to."""
+    frames: Mapping[str, FrameTable] = field(default_factory=dict)
+    """Frames that the URDF lacks, such as contact points, by name. Every link of the URDF is a frame already."""
+    contact: ContactTable = field(default_factory=_no_contact)
     """What touches the ground."""
     reach: ReachTable = field(default_factory=ReachTable)
     """How far from the CoM contact points and jets may be in a plan."""
@@ -190,17 +216,21 @@ class RobotFile:
     """How feet go in a start guess with steps."""
     jet: tuple[JetTable, ...] = ()
     """The jets, in their order."""
-    jet_models: Mapping[str, JetModel] = field(default_factory=dict)
-    """Thrust dynamics of sorts of jets, by name."""
+    jet_models: Mapping[str, Engine] = field(default_factory=dict)
+    """How thrust follows the throttle for sorts of jets, by name."""
     capsule: tuple[CapsuleTable, ...] = ()
     """Shapes of links, which keep away from each other; without any, links may go through each other."""
     collision: CollisionTable = field(default_factory=CollisionTable)
     """Which capsules keep away from each other."""
 
 
+UNIONS = {Engine: ENGINES}
+"""What may stand for a type, by its `kind`."""
+
+
 def robot_keys() -> tuple[Key, ...]:
     """Return every key that a `robot.toml` may have."""
-    return keys_of(RobotFile, {})
+    return keys_of(RobotFile, UNIONS)
 
 
 def _positive(name: str, number: float) -> None:

@@ -5,6 +5,8 @@ Equation numbers are those of L'Erario et al. 2022.
 
 from __future__ import annotations
 
+from functools import partial
+
 import casadi as cs
 import numpy as np
 
@@ -12,6 +14,7 @@ from multimodal_to.adam import centroidal as rigid_body
 from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import SX
 from multimodal_to.models import attitude, contact
+from multimodal_to.models.robot import Robot
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
@@ -113,8 +116,39 @@ def static_equilibrium(knot: Knot, parameters: Parameters) -> SX:
 
 
 def steady_thrust(knot: Knot, parameters: Parameters) -> SX:
-    """0 = f(T, 0) + g(T, 0, u): the throttle holds the thrust; no rate is left at knot 0 (eq. 23)."""
-    return thrust_acceleration(knot)
+    """0 = f(T, 0) + g(T, 0, u): the throttle holds the thrust; no rate is left at knot 0 (eq. 23).
+
+    Of an engine of order one 0 = (k u − T) / τ, and of one without a lag 0 = T(u) − T.
+    """
+    return _by_engine(knot, thrust_acceleration(knot), tuple(range(len(knot.robot.jets))))
+
+
+def final_steady_thrust(knot: Knot, parameters: Parameters) -> SX:
+    """0 = f(T, 0) + g(T, 0, u) or 0 = (k u − T) / τ; an engine without a lag holds its thrust by its own row."""
+    jets = lagging_jets(knot.robot)
+    return _by_engine(knot, thrust_acceleration(knot), jets)
+
+
+def lagging_jets(robot: Robot) -> tuple[int, ...]:
+    """Return which jets have an engine that lags behind its throttle."""
+    return tuple(index for index, jet in enumerate(robot.jets) if jet.model.order > 0)
+
+
+def _by_engine(knot: Knot, accelerations: SX, jets: tuple[int, ...]) -> SX:
+    """Return T̈ of engines of order two, and what others are off their thrust by.
+
+    Args:
+        knot: with thrusts and throttles.
+        accelerations: T̈ of all jets [N/s²], (jets, 1).
+        jets: that are asked for.
+    """
+    rows = [
+        accelerations[index]
+        if knot.robot.jets[index].model.order == 2
+        else knot.robot.jets[index].model.imbalance(knot.thrust[index], knot.throttle[index])
+        for index in jets
+    ]
+    return cs.vertcat(cs.SX(0, 1), *rows)
 
 
 def unit_quaternion(knot: Knot, parameters: Parameters) -> SX:
@@ -211,8 +245,22 @@ def thrust_integration(interval: Interval, parameters: Parameters) -> SX:
 
 
 def thrust_dynamics(interval: Interval, parameters: Parameters) -> SX:
-    """Ṫ⁺ − Ṫ − (f(T⁺, Ṫ⁺) + g(T⁺, Ṫ⁺, u⁺)) Δt = 0 (eq. 23, 26b)."""
-    return interval.velocity_gap(lambda knot: knot.thrust_rate, thrust_acceleration)
+    """Ṫ⁺ − Ṫ − (f(T⁺, Ṫ⁺) + g(T⁺, Ṫ⁺, u⁺)) Δt = 0 (eq. 23, 26b).
+
+    Of an engine of order one Ṫ⁺ − (k u⁺ − T⁺) / τ = 0, by leapfrog with the mean over both ends of the interval. Of one
+    without a lag T(u⁺) − T⁺ = 0.
+    """
+    gaps = interval.velocity_gap(lambda knot: knot.thrust_rate, thrust_acceleration)
+    for index, jet in enumerate(parameters.robot.jets):
+        if jet.model.order == 1:
+            gaps[index] = interval.end.thrust_rate[index] - interval.mean(partial(_imbalance, index))
+        elif jet.model.order == 0:
+            gaps[index] = _imbalance(index, interval.end)
+    return gaps
+
+
+def _imbalance(index: int, knot: Knot) -> SX:
+    return knot.robot.jets[index].model.imbalance(knot.thrust[index], knot.throttle[index])
 
 
 def sliding(interval: Interval, parameters: Parameters) -> SX:
@@ -234,9 +282,12 @@ def _slips(interval: Interval, forces: list[SX], parameters: Parameters) -> SX:
 
 
 def thrust_acceleration(knot: Knot) -> SX:
-    """Return T̈ of each jet from its thrust, thrust rate and throttle [N/s²], (jets, 1) (eq. 23)."""
+    """Return T̈ of each jet from its thrust, thrust rate and throttle [N/s²], (jets, 1) (eq. 23).
+
+    It is zero of engines of a lower order.
+    """
     accelerations = [
-        jet.model.acceleration(knot.thrust[index], knot.thrust_rate[index], knot.throttle[index])
+        jet.model.slopes(knot.thrust[index], knot.thrust_rate[index], knot.throttle[index])[1]
         for index, jet in enumerate(knot.robot.jets)
     ]
     return cs.vertcat(cs.SX(0, 1), *accelerations)

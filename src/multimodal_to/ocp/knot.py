@@ -10,7 +10,7 @@ import casadi as cs
 from multimodal_to.adam import quaternion
 from multimodal_to.adam.kinematics import Pose, forward_kinematics
 from multimodal_to.adam.spatial import SX
-from multimodal_to.models.centroidal import momentum_rate, thrust_force
+from multimodal_to.models.centroidal import drag_moment, momentum_rate, thrust_force
 from multimodal_to.models.robot import Robot
 from multimodal_to.ocp.lifting import Lift, not_lifted
 from multimodal_to.values import Value
@@ -66,12 +66,19 @@ class Knot(Value):
 
     @cached_property
     def momentum_rate(self) -> tuple[SX, SX]:
-        """Return m ẍ = m g + Σ f [N] and ḣω = Σ (p − x) × f [N m] under all contacts and jets, (3, 1) each (eq. 14)."""
+        """Return m ẍ = m g + Σ f [N] and ḣω = Σ (p − x) × f [N m] under all contacts and jets, (3, 1) each (eq. 14).
+
+        Rotors add the moments of their drag to ḣω.
+        """
         forces = list(zip(self.points, self.forces, strict=True))
         for index, jet in enumerate(self.robot.jets):
             pose = self.pose(jet.frame)
             forces.append((pose.translation, thrust_force(pose.rotation, self.thrust[index])))
-        return momentum_rate(self.robot.mass, cs.DM(self.robot.gravity), self.com_position, forces)
+        linear, angular = momentum_rate(self.robot.mass, cs.DM(self.robot.gravity), self.com_position, forces)
+        for index, jet in enumerate(self.robot.jets):
+            if jet.drag:
+                angular = angular + drag_moment(self.pose(jet.frame).rotation, self.thrust[index], jet.drag)
+        return linear, angular
 
     @cached_property
     def forces(self) -> list[SX]:

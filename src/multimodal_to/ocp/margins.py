@@ -43,7 +43,8 @@ def generalised_forces(interval: Interval) -> SX:
     for index, jet in enumerate(knot.robot.jets):
         nozzle = forward_kinematics(tree, tree.frame(jet.frame), base, knot.joint_positions)
         force = thrust_force(nozzle.rotation, knot.thrust[index])
-        wrenches[jet.frame] = wrenches.get(jet.frame, cs.SX(6, 1)) + cs.vertcat(force, cs.SX(3, 1))
+        moment = jet.drag * force if jet.drag else cs.SX(3, 1)
+        wrenches[jet.frame] = wrenches.get(jet.frame, cs.SX(6, 1)) + cs.vertcat(force, moment)
     acceleration = interval.rate(lambda knot: knot.base_linear_velocity) - cs.DM(knot.robot.gravity)
     turning = interval.rate(lambda knot: knot.base_angular_velocity)
     in_base = inverse_dynamics(

@@ -126,7 +126,7 @@ def prepared(robot: Robot, scenario: Scenario) -> tuple[Robot, Posture]:
     """
     if not scenario.jets:
         robot = robot.with_jets(())
-    if not robot.contacts:
+    if not robot.contacts and (scenario.start is Start.STANDING or scenario.terminal is Terminal.STANDING):
         raise ScenarioError(f"{robot.name} has no contact points to stand on")
     failing_knots(scenario.failures, robot.jet_names, scenario.knots)  # which refuses a jet that is not there
     for group in scenario.weights.joint_velocities:

@@ -15,9 +15,11 @@ from multimodal_to.models.contact import FACES
 from multimodal_to.ocp import constraints, contacts, costs, failures, regions
 from multimodal_to.ocp.contacts import ON_GROUND
 from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.ocp.schedule import Flags
 from multimodal_to.ocp.terms import (
     Constraint,
     Cost,
+    EngineUnits,
     IntervalFunction,
     JointUnits,
     KnotFunction,
@@ -53,6 +55,14 @@ class _Each:
 def each(of: str, *axes: str) -> Labels:
     """Return the labels of rows that are repeated for each "joint", "contact" or "jet"."""
     return _Each(of, axes or ("",))
+
+
+def _lagging_jets(parameters: Parameters) -> tuple[str, ...]:
+    return tuple(parameters.robot.jet_names[index] for index in constraints.lagging_jets(parameters.robot))
+
+
+def _running_lagging_jets(parameters: Parameters) -> Flags:
+    return failures.running(parameters)[list(constraints.lagging_jets(parameters.robot))]
 
 
 def _faces(parameters: Parameters) -> tuple[str, ...]:
@@ -196,7 +206,7 @@ STATIC_EQUILIBRIUM = Constraint(
 STEADY_THRUST = Constraint(
     value=constraints.steady_thrust,
     within=equal(),
-    unit="N/s²",
+    unit=EngineUnits("N", "N/s", "N/s²"),
     holds=Where.FIRST_KNOT,
     scale=FORCE,
     labels=each("jet"),
@@ -240,7 +250,7 @@ THRUST_INTEGRATION = Constraint(
 THRUST_DYNAMICS = Constraint(
     value=constraints.thrust_dynamics,
     within=equal(),
-    unit="N/s",
+    unit=EngineUnits("N", "N/s", "N/s"),
     holds=Where.EVERY_INTERVAL,
     scale=FORCE,
     labels=each("jet"),
@@ -292,14 +302,14 @@ FINAL_EQUILIBRIUM = Constraint(
 )
 FINAL_STEADY_THRUST = Constraint(
     name="final_steady_thrust",
-    value=constraints.steady_thrust,
+    value=constraints.final_steady_thrust,
     within=equal(),
-    unit="N/s²",
+    unit=EngineUnits("N", "N/s", "N/s²", lagging=True),
     holds=Where.LAST_KNOT,
     scale=FORCE,
-    labels=each("jet"),
+    labels=_lagging_jets,
     when=_hovers_last,
-    present=failures.running,
+    present=_running_lagging_jets,
 )
 MOMENTUM_AT_START = Constraint(
     value=constraints.momentum_at_start,

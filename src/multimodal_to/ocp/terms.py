@@ -56,6 +56,25 @@ class JointUnits:
         return either(self.turning)
 
 
+@dataclass(frozen=True)
+class EngineUnits:
+    """The units of rows that are jets: by the order of a jet's engine."""
+
+    none: str  # of one without a lag
+    first: str  # of one of order one
+    second: str  # of one of order two
+    lagging: bool = False  # rows are only of jets whose engines lag
+
+    def __call__(self, parameters: Parameters) -> tuple[str, ...]:
+        """Return the unit of each jet."""
+        orders = [jet.model.order for jet in parameters.robot.jets]
+        return tuple((self.none, self.first, self.second)[order] for order in orders if order or not self.lagging)
+
+    def __str__(self) -> str:
+        """Return the unit of a turbine's row."""
+        return self.second
+
+
 class Where(Enum):
     """Where on the horizon a term holds or is charged."""
 

@@ -33,6 +33,7 @@ def link_paths(robot: Robot, appearance: Appearance, root: str) -> dict[str, str
     described = parse_urdf(robot.urdf)
     shown = {visual.link for visual in appearance.visuals} | {jet.frame for jet in robot.jets}
     above = {joint.child: joint.parent for joint in described.joints}
+    above |= {name: frame.link for name, frame in robot.added_frames.items()}
 
     def path(name: str) -> str:
         parts, link = [segment(name)], above.get(name)
@@ -42,7 +43,8 @@ def link_paths(robot: Robot, appearance: Appearance, root: str) -> dict[str, str
             link = above.get(link)
         return "/".join([root, *reversed(parts)])
 
-    return {link.name: path(link.name) for link in described.links if link.name in shown}
+    names = (*(link.name for link in described.links), *robot.added_frames)
+    return {name: path(name) for name in names if name in shown}
 
 
 def link_poses(robot: Robot, trajectory: Trajectory, paths: Mapping[str, str]) -> dict[str, Array]:

@@ -11,9 +11,9 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import ModelError, unknown
+from multimodal_to.files.packages import package_file
 from multimodal_to.files.reading import read_toml
 from multimodal_to.files.records import Records
-from multimodal_to.replay.meshes import package_file
 
 DRESS_FILE = "dress.toml"
 _RECORDS = Records(what="the dress", error=ModelError)

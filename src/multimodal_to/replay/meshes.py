@@ -6,7 +6,6 @@ import io
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -16,11 +15,9 @@ import trimesh
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import MultimodalError, said
+from multimodal_to.files.packages import ROOT_VARIABLES, package_folders
 from multimodal_to.replay.collada import mended
 from multimodal_to.values import Value
-
-ROOT_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH")
-"""Environment variables that list folders in which packages of meshes lie."""
 
 SUFFIXES = (".stl", ".dae", ".obj", ".ply", ".glb", ".gltf", ".off")
 """Kinds of mesh files that are read."""
@@ -90,7 +87,7 @@ def find_mesh(uri: str, urdf: Path) -> Path:
     """Return the file that a mesh's address in a URDF means.
 
     `package://NAME/PATH` and `model://NAME/PATH` mean PATH in the folder NAME: one that holds the URDF, or lies beside
-    it or beside a folder above it, or in a folder of `ROOT_VARIABLES`, or in the installed example-robot-data. Any
+    it or beside a folder above it, or in a folder of `ROOT_VARIABLES`, or the folder of an installed package. Any
     other path is relative to the URDF, or absolute, with `file://` before it or not. Backslashes are taken for slashes
     where no file has them in its name. Links are followed as the system does; a URDF that is one lies in both places.
     No address may leave its root by `..`: that is the folder NAME, or the package that holds the URDF (else the folder
@@ -140,7 +137,7 @@ def _places(
     homes = tuple(dict.fromkeys((urdf.absolute(), urdf.resolve())))
     if scheme in _SCHEMES:
         name, _, inside = address.lstrip("/").partition("/")
-        roots = [root for home in homes for root in _package_folders(name, home) if root.is_dir()]
+        roots = [root for home in homes for root in package_folders(name, home) if root.is_dir()]
         for root in roots:
             yield (root, root), inside.lstrip("/")
         if roots:
@@ -162,37 +159,12 @@ def _places(
         problems[f"not found as a mesh: no {', '.join(SUFFIXES)} file"] = None
 
 
-def _package_folders(name: str, urdf: Path) -> Iterator[Path]:
-    if name in ("", ".", "..") or "\\" in name:
-        return
-    for folder in urdf.parents:
-        if folder.name == name:
-            yield folder
-        yield folder / name
-    for variable in ROOT_VARIABLES:
-        for entry in filter(None, os.environ.get(variable, "").split(os.pathsep)):
-            yield Path(entry) / name
-            yield Path(entry) / "share" / name
-    if name == "example-robot-data" and (share := package_file(name, "example-robot-data/package.xml")) is not None:
-        yield share.parent
-
-
 def _own_root(urdf: Path) -> Path:
     folders = urdf.parents
     packages = (
         folder for folder in folders if any((folder / mark).is_file() for mark in ("package.xml", "robot.toml"))
     )
     return next(packages, folders[min(1, len(folders) - 1)])
-
-
-def package_file(package: str, ending: str) -> Path | None:
-    """Return the file of an installed package whose path ends so; None where the package is not installed."""
-    try:
-        files = metadata.files(package) or []
-    except (metadata.PackageNotFoundError, ValueError):
-        return None
-    found = (Path(str(file.locate())) for file in files if f"/{file.as_posix()}".endswith(f"/{ending}"))
-    return next((Path(os.path.normpath(path)) for path in found if path.is_file()), None)
 
 
 def _colour(mesh: Any) -> tuple[float, ...] | None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array, Inertia
-from multimodal_to.adam.tree import Joint, Link, Tree
+from multimodal_to.adam.tree import FixedFrame, Joint, Link, Tree
 from multimodal_to.adam.urdf import read_urdf
 from multimodal_to.arguments import checked, vector
 from multimodal_to.errors import InputError, ModelError, OutputError, listed, said
@@ -221,12 +221,19 @@ def _add_bodies(mujoco: ModuleType, spec: Any, robot: Robot) -> tuple[str, ...]:
     below: dict[str, list[Joint]] = {}
     for joint in joints:
         below.setdefault(joint.parent, []).append(joint)
+    of_link: dict[str, list[tuple[str, FixedFrame]]] = {}
+    for frame, fixed in robot.added_frames.items():
+        of_link.setdefault(fixed.link, []).append((frame, fixed))
     base = spec.worldbody.add_body(name=_body_name(robot, tree.base))
     base.add_freejoint()
     pending = [(tree.base, base)]
     while pending:
         name, body = pending.pop()
         _set_inertia(body, by_name[name])
+        for frame, added in of_link.get(name, ()):
+            body.add_body(
+                name=_body_name(robot, frame), pos=added.translation, quat=_quaternion(mujoco, added.rotation)
+            ).explicitinertial = True
         for joint in reversed(below.get(name, [])):
             child = body.add_body(
                 name=_body_name(robot, joint.child), pos=joint.translation, quat=_quaternion(mujoco, joint.rotation)
@@ -415,5 +422,5 @@ def _add_actuators(mujoco: ModuleType, spec: Any, robot: Robot, limits: Array | 
             name=_free(jet.name, robot.joint_names),
             trntype=mujoco.mjtTrn.mjTRN_SITE,
             target=jet.name,
-            gear=[0.0, 0.0, -1.0, 0.0, 0.0, 0.0],
+            gear=[0.0, 0.0, -1.0, 0.0, 0.0, -jet.drag],
         )

@@ -9,14 +9,13 @@ plus the stabiliser's ΔT: T̈ = T̈* + K_T (T* + ΔT − T) + D_T (Ṫ* − Ṫ
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, TrajectoryError
-from multimodal_to.models.jet import Jet
+from multimodal_to.models.jet import FirstOrder, Jet, StaticMap
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.models.terrain import FlatGround
@@ -277,12 +276,10 @@ class Player:
             throttle = float(plan.throttle[step, index])
             if self._stabilise:
                 wish = min(max(planned[0] + float(change[index]), 0.0), jet.thrust_max)
-                acceleration = float(jet.model.acceleration(*planned, throttle))
-                acceleration += THRUST_STIFFNESS * (wish - state[0]) + THRUST_DAMPING * (planned[1] - state[1])
-                throttle = _throttle(jet, *state, acceleration)
+                throttle = _throttle(jet, state, planned, throttle, wish)
             self._throttle[index] = throttle
-            self._rate[index] += TIME_STEP * float(jet.model.acceleration(*state, throttle))
-            self._thrust[index] = max(state[0] + TIME_STEP * self._rate[index], 0.0)
+            self._rate[index], thrust = _spooled(jet, state, throttle)
+            self._thrust[index] = max(thrust, 0.0)
 
     def _borne_by_joints(self, step: int) -> Array:
         """Return Jᵀ f of the thrusts' difference from the plan and of the forces that are asked of the ground."""
@@ -316,21 +313,46 @@ class Player:
         return forces
 
 
-def _throttle(jet: Jet, thrust: float, rate: float, acceleration: float) -> float:
-    """Return the throttle within its range whose T̈ comes nearest to the one wanted: u + B_UU u² = (T̈ − f) / g.
+def _throttle(
+    jet: Jet, state: tuple[float, float], planned: tuple[float, float], throttle: float, wish: float
+) -> float:
+    """Return the throttle within its range that brings a thrust to the one wished for.
 
     Args:
-        jet: with its model and range.
-        thrust: T [N].
-        rate: Ṫ [N/s].
-        acceleration: T̈ that is wanted [N/s²].
+        jet: with its engine and range.
+        state: T [N] and Ṫ [N/s].
+        planned: T [N] and Ṫ [N/s] of the plan.
+        throttle: of the plan [%].
+        wish: T that is wanted [N].
     """
-    model: Any = jet.model
-    gain = model.B_U + model.B_T * thrust + model.B_D * rate
-    wanted = (acceleration - float(model.acceleration(thrust, rate, 0.0))) / gain
-    root = 1.0 + 4.0 * model.B_UU * wanted
-    throttle = jet.throttle_max if root < 0.0 else 2.0 * wanted / (1.0 + root**0.5)
-    return float(min(max(throttle, jet.throttle_min), jet.throttle_max))
+    engine = jet.model
+    slope = wish
+    if engine.order == 1:
+        slope = planned[1] + THRUST_STIFFNESS / THRUST_DAMPING * (wish - state[0])
+    elif engine.order == 2:
+        slope = float(engine.slopes(*planned, throttle)[1])
+        slope += THRUST_STIFFNESS * (wish - state[0]) + THRUST_DAMPING * (planned[1] - state[1])
+    return float(min(max(engine.throttle_for(*state, slope, jet.throttle_max), jet.throttle_min), jet.throttle_max))
+
+
+def _spooled(jet: Jet, state: tuple[float, float], throttle: float) -> tuple[float, float]:
+    """Return Ṫ [N/s] and T [N] after a step of the simulation.
+
+    Args:
+        jet: with its engine.
+        state: T [N] and Ṫ [N/s] before it.
+        throttle: u [%].
+    """
+    engine, (thrust, rate) = jet.model, state
+    if isinstance(engine, StaticMap):
+        after = float(engine.thrust(throttle))
+        return (after - thrust) / TIME_STEP, after
+    if isinstance(engine, FirstOrder):
+        gained = float(-engine.imbalance(thrust, throttle)) * engine.time_constant
+        gained *= float(np.expm1(-TIME_STEP / engine.time_constant))
+        return gained / TIME_STEP, thrust + gained
+    rate += TIME_STEP * float(engine.slopes(thrust, rate, throttle)[1])
+    return rate, thrust + TIME_STEP * rate
 
 
 def _inertia(robot: Robot) -> Array:

@@ -209,7 +209,9 @@ def _thrusts(
         weights: W, of forces [1/N] and moments [1/(N m)], (6,).
     """
     axes = _axes(simulation, data)
-    wrenches = np.vstack([axes.T, np.cross(data.site_xpos[simulation.jets] - origin, axes).T])
+    arms = data.site_xpos[simulation.jets] - origin
+    drags = np.array([jet.drag for jet in simulation.robot.jets]).reshape(-1, 1)
+    wrenches = np.vstack([axes.T, (np.cross(arms, axes) + drags * axes).T])
     off, spreads = turbines.thrust - planned, np.full(len(axes), spread)
     change = _ridge(wrenches, wanted, spreads, weights)
     stuck = (turbines.at_most & (change > off)) | (turbines.at_least & (change < off))
@@ -253,11 +255,13 @@ def _effect_of_joints(simulation: SimulationModel, data: Any, origin: Array, thr
     linear, angular, of_com = (np.zeros((3, model.nv)) for _ in range(3))
     mujoco.mj_jacSubtreeCom(model, data, of_com, 1)
     effect, moves = np.zeros((6, model.nv)), np.zeros(model.nv, dtype=bool)
-    for site, force in zip(simulation.jets, _axes(simulation, data) * thrust[:, None], strict=True):
+    forces = _axes(simulation, data) * thrust[:, None]
+    for jet, site, force in zip(simulation.robot.jets, simulation.jets, forces, strict=True):
         mujoco.mj_jacSite(model, data, linear, angular, site)
         turned = -_skew(force) @ angular
         effect[:3] += turned
         effect[3:] += _skew(data.site_xpos[site] - origin) @ turned - _skew(force) @ (linear - (not stands) * of_com)
+        effect[3:] += jet.drag * turned
         moves |= angular.any(axis=0)
     if stands:
         effect[3:] -= _skew(simulation.robot.mass * simulation.robot.gravity) @ of_com

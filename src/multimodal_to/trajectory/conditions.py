@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -83,7 +83,8 @@ def _facts(robot: Robot) -> dict[str, Any]:
                 "thrust_max": float(jet.thrust_max),
                 "throttle_min": float(jet.throttle_min),
                 "throttle_max": float(jet.throttle_max),
-                "model": asdict(jet.model),
+                "drag": float(jet.drag),
+                "model": {name: float(value) for name, value in vars(jet.model).items()},
             }
             for jet in robot.jets
         },

@@ -369,7 +369,8 @@ def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
             velocities[6:],
             accelerations[:6],
             accelerations[6:],
-            *(np.vstack([force, np.zeros((3, count))]) for force in (*contacts, *thrusts)),
+            *(np.vstack([force, np.zeros((3, count))]) for force in contacts),
+            *(np.vstack([force, jet.drag * force]) for jet, force in zip(robot.jets, thrusts, strict=True)),
         )
     )
     if not rules.instant(trajectory.rule, "joint_velocities"):
