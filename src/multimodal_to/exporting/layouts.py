@@ -15,6 +15,7 @@ from multimodal_to.adam import KinDynComputations
 from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.tree import Joint
 from multimodal_to.adam.urdf import read_urdf
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, ModelError, OutputError, listed, said, shown, unknown
 from multimodal_to.files.reading import read_toml
 from multimodal_to.models.robot import Robot
@@ -33,6 +34,7 @@ class Layout:
     free_joint: str = "root"  # what the joint of the base is called, where it has a name
 
 
+@checked
 def layout_of(
     robot: Robot,
     order: str,
@@ -67,6 +69,7 @@ def layout_of(
     return found
 
 
+@checked
 def moving_joints(robot: Robot) -> tuple[Joint, ...]:
     """Return all joints of the robot's URDF, fixed ones too, in the order of the file.
 
@@ -112,16 +115,19 @@ def _depth_first(joints: Sequence[Joint], base: str, key: Callable[[Joint], Any]
     return found
 
 
+@checked
 def by_mujoco(joints: Sequence[Joint], base: str) -> list[Joint]:
     """Return them depth first; of several on a link, in the order of the file."""
     return _depth_first(joints, base, key=lambda joint: 0)
 
 
+@checked
 def by_pinocchio(joints: Sequence[Joint], base: str) -> list[Joint]:
     """Return them depth first; of several on a link, by name in the order of bytes, as urdfdom keeps them."""
     return _depth_first(joints, base, key=lambda joint: joint.name.encode("utf-8"))
 
 
+@checked
 def by_isaac(joints: Sequence[Joint], base: str) -> list[Joint]:
     """Return them breadth first over bodies that move, links behind fixed joints merged; on one body by name."""
     below, found, level = _below(joints), [], [base]
@@ -139,6 +145,7 @@ def by_isaac(joints: Sequence[Joint], base: str) -> list[Joint]:
     return found
 
 
+@checked
 def by_file(joints: Sequence[Joint], base: str) -> list[Joint]:
     """Return them in the order of the file."""
     return [joint for joint in joints if joint.kind != "fixed"]

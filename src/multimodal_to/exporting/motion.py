@@ -88,6 +88,7 @@ def write_motion(
     return Path(path)
 
 
+@checked
 def order_and_names(
     joint_order: str | os.PathLike[str] | None, usual: str
 ) -> tuple[str, str | os.PathLike[str] | None]:
@@ -177,6 +178,7 @@ def _write_unitree(frames: Frames, path: Path) -> None:
         np.savetxt(stream, rows, fmt="%.9f", delimiter=",")
 
 
+@checked
 def motion_count(frames: Frames) -> int:
     """Return the number of frames."""
     return int(frames.motion.time.size)

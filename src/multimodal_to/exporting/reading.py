@@ -107,6 +107,7 @@ def read_motion(
     raise refused[0]
 
 
+@checked
 def flavours_of(stored: Mapping[str, Array]) -> tuple[str, ...]:
     """Return which flavours an archive may be of, by its keys; none where it is no motion file.
 

@@ -11,7 +11,7 @@ from enum import Enum
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.arguments import check_fields
+from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import ScenarioError, listed, shown
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.contacts import ContactState, ContactStretch
@@ -67,6 +67,7 @@ class GaitPlan:
         if self.clearance is not None and not 0.0 <= self.clearance < float("inf"):
             raise ScenarioError(f"gait: clearance is {shown(self.clearance)}; expected at least zero [m]")
 
+    @checked
     def stretches(self, robot: Robot) -> tuple[ContactStretch, ...]:
         """Return what the gait gives of every foot of a robot, over the whole horizon.
 

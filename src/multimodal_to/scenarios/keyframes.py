@@ -138,6 +138,7 @@ class Keyframe:
 
     # ---------------------------------------------------------------- what is asked
 
+    @checked
     def at(self, knots: int) -> int:
         """Return the knot of a horizon of so many intervals."""
         if self.knot is not None:
@@ -156,6 +157,7 @@ class Keyframe:
         """Return whether nothing moves there."""
         return self.rest or self.hover or self.standing
 
+    @checked
     def from_home(self, home: Vector3) -> Keyframe:
         """Return the keyframe with numbers for a CoM that is said from home's [m]."""
         if not self.of_home:

@@ -163,6 +163,7 @@ class Design:
         }
 
     @classmethod
+    @checked
     def of_plain(cls, table: Mapping[str, Any]) -> Design:
         """Return the sweep that `plain` made data of."""
         of_lists = {

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError
 from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.derived import acting_times
@@ -37,6 +38,7 @@ _SMALL = 1e-4
 """Below this angle the series of sin(x)/x and its kin are exact to 1e-16 [rad]."""
 
 
+@checked
 def smooth(trajectory: Trajectory, times: Array) -> Trajectory:
     """Return the trajectory at other times [s], with every quantity at its own time and no jump of velocity.
 
@@ -70,6 +72,7 @@ def smooth(trajectory: Trajectory, times: Array) -> Trajectory:
     return replace(trajectory, time=wanted, rule=rules.SAMPLED, **arrays)
 
 
+@checked
 def frame_times(trajectory: Trajectory, fps: float) -> Array:
     """Return the times of frames at a rate [1/s] from the first knot on, (frames,); a rest at the end is none.
 
@@ -133,12 +136,14 @@ def _turned(trajectory: Trajectory, before: NDArray[np.intp], step: Array, share
     }
 
 
+@checked
 def product(left: Array, right: Array) -> Array:
     """Return left ∘ right of quaternions x y z w in columns, (4, count)."""
     v, w, u, s = left[:3], left[3], right[:3], right[3]
     return np.vstack([w * u + s * v + np.cross(v, u, axis=0), w * s - (v * u).sum(axis=0)])
 
 
+@checked
 def rotation_vectors(quaternions: Array) -> Array:
     """Return Log(ρ) of unit quaternions x y z w in columns [rad], (3, count), of at most half a turn."""
     vectors = quaternions[:3] * np.where(quaternions[3] < 0.0, -1.0, 1.0)
