@@ -13,9 +13,6 @@ reach = replace(
     mt.scenarios.landing(),
     name="reach",
     title="Reaching for a point with the left hand while hovering",
-    knots=60,
-    interval_min=0.1,
-    interval_max=0.1,
     initial_com=(0.0, 0.0, 0.80),
     final_com=(0.0, 0.0, 0.80),
     terminal=mt.Terminal.HOVER,
@@ -26,7 +23,7 @@ solution = mt.solve(mt.build(robot, reach))
 motion = solution.trajectory
 print(solution.status.value, "after", solution.iterations, "iterations in", round(solution.solve_time, 1), "s")
 print("physically true:", mt.audit(robot, motion).holds)
-state = mt.state_at(motion, motion.time[30])
+state = mt.state_at(motion, motion.time[motion.knots // 2])
 hand = np.array(robot.kindyn.forward_kinematics(HAND, state.posture.base_transform, state.joint_positions))[:3, 3]
 print(f"off the point: {1e3 * np.linalg.norm(hand - POINT):.3f} mm")
 

@@ -260,3 +260,61 @@ def test_a_bundled_scenario_said_by_keyframes_is_the_same_problem(ironcub, name)
 def test_the_take_off_said_by_keyframes_has_the_same_answer(ironcub, take_off):
     again = mt.solve(mt.build(ironcub, said_by_keyframes(mt.scenarios.take_off())))
     assert (again.iterations, again.objective) == (take_off.iterations, take_off.objective)
+
+
+def test_an_end_that_only_asks_for_a_height_finds_where_it_hovers(hopper):
+    end = mt.Keyframe(when="end", com={"z": 0.6}, hover=True)
+    task = replace(hop(hopper, allowances={"throttle rate": 1e3}), terminal=None, final_com=None, keyframes=(end,))
+    assert task.terminal is mt.Terminal.HOVER
+    assert not mt.doctor(hopper, task).hopeless
+    solution = mt.solve(mt.build(hopper, task))
+    assert solution.status.solved
+    assert solution.trajectory.com_position[2, -1] == pytest.approx(0.6, abs=1e-8)
+    report = mt.audit(hopper, solution.trajectory)
+    assert report.holds
+    assert "end: CoM" not in {finding.name for finding in report.findings}
+
+
+def test_a_planner_keeps_the_keyframes_on_the_way_to_another_end(hopper):
+    on_the_way = mt.Keyframe(knot=24, com_min={"z": 0.55})
+    planner = mt.Planner(hopper, hop(hopper, keyframes=(on_the_way,)))
+    solution = planner.solve(final_com=(0.0, 0.0, 0.62))
+    assert solution.status.solved
+    assert solution.trajectory.com_position[:, -1] == pytest.approx([0.0, 0.0, 0.62], abs=1e-8)
+    assert solution.trajectory.com_position[2, 24] >= 0.55 - 1e-8
+    assert planner.problem.bound_rows["end: CoM"].lower == pytest.approx([0.0, 0.0, 0.62])
+
+
+def test_a_turn_of_a_hover_is_guessed_and_made(hopper):
+    task = hop(
+        hopper,
+        start=mt.Start.HOVER,
+        initial_com=(0.0, 0.0, 0.6),
+        keyframes=(mt.Keyframe(when="end", yaw=0.5),),
+    )
+    problem = mt.build(hopper, task)
+    first, last = (
+        problem.layout.read_horizon(problem.guess * problem.scale)["base_quaternion_xyzw"][:, k] for k in (0, -1)
+    )
+    assert abs(first @ last) == pytest.approx(np.cos(0.25), abs=1e-6)
+    solution = mt.solve(problem)
+    assert solution.status.solved
+    assert mt.audit(hopper, solution.trajectory).holds
+    end = solution.trajectory.base_quaternion_xyzw[:, -1]
+    assert abs(end @ heading(0.5)) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_weight_stays_off_feet_in_the_air_between_two_hovers(hopper):
+    task = hop(
+        hopper,
+        start=mt.Start.HOVER,
+        initial_com=(0.0, 0.0, 0.6),
+        final_com=(0.0, 0.5, 0.6),
+        keyframes=(mt.Keyframe(when=0.5, com={"z": 0.7}, hover=True),),
+    )
+    problem = mt.build(hopper, task)
+    guess = problem.layout.read_horizon(problem.guess * problem.scale)
+    assert np.abs(guess["contact_forces"]).max() < 0.011
+    assert guess["thrust"].sum(axis=0) == pytest.approx(np.full(31, hopper.weight))
+    assert guess["com_position"][2, 15] == pytest.approx(0.7)
+    assert mt.solve(problem).status.solved
