@@ -1,8 +1,8 @@
 """Draw the pictures of the README and set its table of results: python docs/make_pictures.py.
 
 Both come from what `multimodal-to reproduce` and the examples from 11 on wrote to results/. The README has the first of
-its two tables, with its note; docs/results.md has both. Needs Chromium (`apt-get install chromium`), which takes the snapshots, and
-icub-models (`pip install '.[meshes]'`).
+its two tables, with its note; docs/results.md has both. Needs Chromium (`apt-get install chromium`), which takes the
+snapshots, and icub-models (`pip install '.[meshes]'`).
 """
 
 from pathlib import Path

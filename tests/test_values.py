@@ -80,6 +80,7 @@ def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         "JetFailure": mt.JetFailure(jet="left", at=0.5),
         "KinDynComputations": robot.kindyn,
         "Knot": at,
+        "KnownPush": mt.KnownPush(of="body", force=[1, 0, 0], begin=0.2),
         "Margins": mt.Margins(torque=0.5),
         "Parameters": mt.Parameters.of(robot, scenario, robot.home),
         "Problem": problem,

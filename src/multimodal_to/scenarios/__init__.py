@@ -14,6 +14,7 @@ from multimodal_to.scenarios.bundled import (
 from multimodal_to.scenarios.contacts import ContactState, ContactStretch
 from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitKind, GaitPlan
+from multimodal_to.scenarios.pushes import KnownPush
 from multimodal_to.scenarios.regions import Box, Wall
 from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
 
@@ -25,6 +26,7 @@ __all__ = [
     "GaitKind",
     "GaitPlan",
     "JetFailure",
+    "KnownPush",
     "Margins",
     "Scenario",
     "Start",

@@ -15,6 +15,7 @@ from multimodal_to.models.terrain import FlatGround, Surface
 from multimodal_to.scenarios.contacts import ContactStretch
 from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitPlan
+from multimodal_to.scenarios.pushes import KnownPush
 from multimodal_to.scenarios.regions import Box, Wall
 from multimodal_to.values import FrozenMapping
 
@@ -206,6 +207,8 @@ class Scenario:
     """Steps in a pattern, which give every foot; what `contacts` says beside it holds instead."""
     failures: tuple[JetFailure, ...] = ()
     """Jets that fail, and when."""
+    pushes: tuple[KnownPush, ...] = ()
+    """Forces from outside that the plan knows of."""
     walls: tuple[Wall, ...] = ()
     """Half-spaces that the robot stays in."""
     boxes: tuple[Box, ...] = ()
@@ -214,7 +217,7 @@ class Scenario:
     def __post_init__(self) -> None:
         check_fields(self, ScenarioError)
         object.__setattr__(self, "allowances", FrozenMapping(self.allowances))
-        for label in ("contacts", "failures", "walls", "boxes"):
+        for label in ("contacts", "failures", "pushes", "walls", "boxes"):
             object.__setattr__(self, label, tuple(getattr(self, label)))
         self._check_name()
         self._check_numbers()
