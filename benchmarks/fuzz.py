@@ -43,7 +43,7 @@ from multimodal_to.models.robot import bundled_robots
 from multimodal_to.models.terrain import HeightField, Plane, Stairs
 from multimodal_to.replay.dress import read_dress
 from multimodal_to.replay.visuals import appearance
-from multimodal_to.scenarios import Box, ContactState, ContactStretch, GaitKind, GaitPlan, JetFailure, Wall
+from multimodal_to.scenarios import Box, ContactState, ContactStretch, GaitKind, GaitPlan, JetFailure, KnownPush, Wall
 from multimodal_to.scenarios.data import stored, to_json
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 from multimodal_to.trajectory.importing import import_arrays
@@ -478,6 +478,7 @@ def sources(kind: str, folder: Path) -> list[Source]:
                 contacts=(ContactStretch(of=("left", "right"), state=ContactState.OFF, begin=0.8, clearance=0.01),),
                 gait=GaitPlan(kind=GaitKind.WALK, steps=4, first="left", clearance=0.02),
                 failures=(JetFailure(jet="left arm", at=0.5),),
+                pushes=(KnownPush(of="chest", force=(10.0, 0.0, 0.0), begin=0.4, end=0.5),),
                 walls=(Wall(normal=(0.0, 0.0, -1.0), offset=-1.5, of=("head",)),),
                 boxes=(Box(lower=(0.0, 0.0, 0.0), upper=(1.0, 1.0, 1.0), begin=0.5),),
             )

@@ -214,6 +214,12 @@ BROKEN = {
     "a jet that fails after the end": toml(
         "based_on = 'take-off'\n[[failures]]\njet = 'left arm'\nat = 1.5", "at is 1.5", "below 1"
     ),
+    "a push of two numbers": toml(
+        "based_on = 'take-off'\n[[pushes]]\nof = 'chest'\nforce = [1, 2]", "'pushes[0].force'", "a list of 3"
+    ),
+    "a push on a frame that is not there": toml(
+        "based_on = 'take-off'\n[[pushes]]\nof = 'tail'\nforce = [1, 2, 3]", "'tail'", error=None
+    ),
     "a wall without a direction": toml(
         "based_on = 'take-off'\n[[walls]]\nnormal = [0, 0, 0]\noffset = 1", "a direction with a length"
     ),

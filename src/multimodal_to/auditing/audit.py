@@ -108,7 +108,7 @@ def audit(robot: Robot, trajectory: Trajectory, scenario: Scenario | None = None
     scenario = scenario or stored(trajectory)
     scenario = None if scenario is None else scenario.for_robot(robot)
     phases = flight_phases(robot, trajectory)
-    motion = Motion.of(robot, trajectory)
+    motion = Motion.of(robot, trajectory, scenario.pushes if scenario else ())
     worst = _of_postures(motion, scenario) if kinematic else _of_all(motion, scenario)
     findings = _findings(worst, motion, scenario)
     return Audit(
@@ -241,8 +241,8 @@ def _dynamics(motion: Motion) -> list[Worst]:
     contacts = (
         at_knots(trajectory, "contact_forces").reshape(len(robot.contacts), 3, trajectory.time.size).transpose(0, 2, 1)
     )
-    acting = np.concatenate([contacts, motion.thrusts])
-    points = np.concatenate([motion.points, motion.thrust_points])
+    acting = np.concatenate([contacts, motion.thrusts, motion.pushes])
+    points = np.concatenate([motion.points, motion.thrust_points, motion.push_points])
     linear = acting.sum(axis=0) + robot.mass * robot.gravity - robot.mass * at_knots(trajectory, "com_acceleration").T
     moments = np.cross(points - trajectory.com_position.T, acting).sum(axis=0) + motion.drag_moments.sum(axis=0)
     turning = moments.T - at_knots(trajectory, "angular_momentum_rate")
@@ -264,7 +264,8 @@ def _followed(values: Array, trajectory: Trajectory) -> Array:
 def _torques(motion: Motion) -> list[Worst]:
     """RNEA along the motion under all contact forces and thrusts: joint torques, and what is left for the base."""
     robot = motion.robot
-    generalised = _followed(generalised_forces(robot, motion.trajectory), motion.trajectory)
+    pushed = list(zip(motion.pushed_frames, motion.pushes.transpose(0, 2, 1), strict=True))
+    generalised = _followed(generalised_forces(robot, motion.trajectory, pushed), motion.trajectory)
     beyond = np.abs(generalised[6:]) - robot.joint_limits.effort[:, None]
     return [
         worst_of("torque beyond effort", beyond, robot.joint_names),

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
+from multimodal_to.scenarios.pushes import KnownPush
 from multimodal_to.trajectory import Trajectory
-from multimodal_to.trajectory.derived import base_poses, contact_points, thrust_forces
+from multimodal_to.trajectory.derived import base_poses, contact_points, frame_poses, thrust_forces
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,10 +51,24 @@ class Motion:
     points: Array  # contact points [m], (contacts, knots + 1, 3)
     thrust_points: Array  # where the jets push [m], (jets, knots + 1, 3)
     thrusts: Array  # with what force [N], (jets, knots + 1, 3)
+    pushed_frames: tuple[str, ...] = ()  # what is pushed from outside
+    push_points: Array  # where [m], (pushes, knots + 1, 3)
+    pushes: Array  # with what force [N], (pushes, knots + 1, 3)
 
     @classmethod
-    def of(cls, robot: Robot, trajectory: Trajectory) -> Motion:
-        """Return a trajectory with its forward kinematics."""
+    def of(cls, robot: Robot, trajectory: Trajectory, known: Sequence[KnownPush] = ()) -> Motion:
+        """Return a trajectory with its forward kinematics.
+
+        Args:
+            robot: that moves.
+            trajectory: its motion.
+            known: what pushes it from outside.
+        """
+        count = trajectory.time.size
+        pushes = np.zeros((len(known), count, 3))
+        for row, push in enumerate(known):
+            pushes[row, list(push.knots(trajectory.knots, trajectory.rule))] = push.force
+        push_points = [frame_poses(robot, trajectory, push.of)[:, :3, 3] for push in known]
         thrust_points, thrusts = thrust_forces(robot, trajectory)
         return cls(
             robot=robot,
@@ -61,6 +77,9 @@ class Motion:
             points=contact_points(robot, trajectory),
             thrust_points=thrust_points,
             thrusts=thrusts,
+            pushed_frames=tuple(push.of for push in known),
+            push_points=np.array(push_points).reshape(-1, count, 3),
+            pushes=pushes,
         )
 
     @property

@@ -85,7 +85,8 @@ class Controls:
     robot: Robot
     trajectory: Trajectory
     steps: int  # of the integrator, an interval
-    points: Array  # p_i, the contact points [m], (instants, contacts, 3)
+    points: Array  # p_i, the contact points and what is pushed [m], (instants, contacts + pushes, 3)
+    forces: Array  # f_i there [N], (knots + 1, contacts + pushes, 3)
     jets: Array  # r_j, the jets from the CoM, base axes [m], (instants, jets, 3)
     directions: Array  # of the thrusts, base axes [1], (instants, jets, 3)
     drags: Array  # moment of each rotor for each newton of its thrust [m], (jets,)
@@ -110,7 +111,9 @@ class Controls:
         count, jets = instants.size, len(robot.jets)
         joints, velocities = spline(trajectory.time, trajectory.joint_positions.T, instants)
         points, _ = spline(
-            trajectory.time, motion.points.transpose(1, 0, 2).reshape(trajectory.time.size, -1), instants
+            trajectory.time,
+            np.concatenate([motion.points, motion.push_points]).transpose(1, 0, 2).reshape(trajectory.time.size, -1),
+            instants,
         )
         base = np.tile(np.eye(4), (1, count))
         com = np.array(kindyn.CoM_position_fun().map(count)(base, joints.T)).T
@@ -123,6 +126,7 @@ class Controls:
             trajectory=trajectory,
             steps=steps,
             points=points.reshape(count, -1, 3),
+            forces=np.concatenate([motion.contact_forces, motion.pushes]).transpose(1, 0, 2),
             jets=poses[:, :, :3, 3] - com[:, None],
             directions=-poses[:, :, :3, 2],
             drags=np.array([jet.drag for jet in robot.jets]),
@@ -170,7 +174,7 @@ class Controls:
             if isinstance(jet.model, StaticMap):
                 thrust[:, row] = jet.model.thrust(plan.throttle[row, columns])
         rotation = rotations(states[:, _RHO])
-        contacts = plan.contact_forces.reshape(len(robot.contacts), 3, plan.time.size).transpose(2, 0, 1)[columns]
+        contacts = self.forces[columns]
         thrusts = thrust[:, :, None] * np.einsum("sij,scj->sci", rotation, self.directions[instants])
         arms = np.einsum("sij,scj->sci", rotation, self.jets[instants])
         acceleration = robot.gravity + (contacts.sum(axis=1) + thrusts.sum(axis=1)) / robot.mass
@@ -231,7 +235,7 @@ class Controls:
         quaternions, _ = spline(plan.time, plan.base_quaternion_xyzw.T, instants)
         thrusts = np.einsum("kij,kcj,kc->ki", rotations(quaternions), self.directions, thrust)
         columns = (np.arange(plan.knots)[:, None] + self.columns).ravel()
-        contacts = plan.contact_forces.reshape(len(robot.contacts), 3, plan.time.size).sum(axis=0).T[columns]
+        contacts = self.forces.sum(axis=1)[columns]
         step = (np.repeat(np.diff(plan.time), self.steps) / self.steps)[:, None]
         starts, middles, ends = (
             robot.gravity + (contacts + part) / robot.mass for part in (thrusts[:-2:2], thrusts[1::2], thrusts[2::2])

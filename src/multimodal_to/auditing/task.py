@@ -173,6 +173,9 @@ def _equilibrium(when: str, motion: Motion, knot: int) -> list[Worst]:
         acting = at_knots(motion.trajectory, "contact_forces")
     forces = np.concatenate([acting[:, knot].reshape(-1, 3), motion.thrusts[:, knot]])
     points = np.concatenate([motion.points[:, knot], motion.thrust_points[:, knot]])
+    if knot:  # the rest before the first knot is that without a push
+        forces = np.concatenate([forces, motion.pushes[:, knot]])
+        points = np.concatenate([points, motion.push_points[:, knot]])
     moment = np.cross(points - com, forces).sum(axis=0) + motion.drag_moments[:, knot].sum(axis=0)
     return [
         _at(f"{when}: force balance", knot, np.abs(forces.sum(axis=0) + robot.mass * robot.gravity)),

@@ -11,6 +11,7 @@ from multimodal_to.doctor.diagnosis import Diagnosis, Symptom, error
 from multimodal_to.doctor.formulation import formulation
 from multimodal_to.doctor.ground import height, hold
 from multimodal_to.doctor.hover import trim
+from multimodal_to.doctor.pushes import pushes
 from multimodal_to.doctor.reach import reach
 from multimodal_to.doctor.regions import regions
 from multimodal_to.doctor.task import Task
@@ -47,6 +48,7 @@ CHECKS: tuple[Check, ...] = (
     keyframes.yaw_without_moment,
     contacts,
     regions,
+    pushes,
 )
 """What is asked of every task."""
 ONCE_SOUND: tuple[Check, ...] = (formulation,)

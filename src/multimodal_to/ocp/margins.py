@@ -5,7 +5,7 @@ Each is a short function of a knot or of an interval; a margin of zero leaves it
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as cs
@@ -19,19 +19,24 @@ from multimodal_to.models import contact
 from multimodal_to.models.centroidal import thrust_force
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.sole import PRESSURE_SLACK, soles
-from multimodal_to.ocp import constraints, contacts, costs, paper
+from multimodal_to.ocp import constraints, contacts, costs, paper, pushes
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.self_collision import link_distances, link_pair_labels
 from multimodal_to.ocp.terms import Constraint, JointUnits, Where, at_least, between
+from multimodal_to.scenarios.pushes import KnownPush
 
 
-def generalised_forces(interval: Interval) -> SX:
+def generalised_forces(interval: Interval, pushed: Sequence[KnownPush] = ()) -> SX:
     """Return M ν̇ + C ν + g − Σ Jᵀ f, (6 + n, 1): wrench left for the base [N, N m], then joint torques [N m].
 
     At the instant at which velocities change: there the accelerations (ν⁺ − ν) / Δt, the forces and the velocities
     belong together.
+
+    Args:
+        interval: with its acceleration.
+        pushed: what pushes from outside then.
     """
     knot, tree = interval.at_accelerations, interval.end.robot.kindyn.tree
     lift, rotation = knot.lift, knot.base.rotation
@@ -45,6 +50,9 @@ def generalised_forces(interval: Interval) -> SX:
         force = thrust_force(nozzle.rotation, knot.thrust[index])
         moment = jet.drag * force if jet.drag else cs.SX(3, 1)
         wrenches[jet.frame] = wrenches.get(jet.frame, cs.SX(6, 1)) + cs.vertcat(force, moment)
+    for push in pushed:
+        force = lift(rotation.T @ cs.DM(push.force))
+        wrenches[push.of] = wrenches.get(push.of, cs.SX(6, 1)) + cs.vertcat(force, cs.SX(3, 1))
     acceleration = interval.rate(lambda knot: knot.base_linear_velocity) - cs.DM(knot.robot.gravity)
     turning = interval.rate(lambda knot: knot.base_angular_velocity)
     in_base = inverse_dynamics(
@@ -70,6 +78,15 @@ def joint_torques(interval: Interval, parameters: Parameters) -> SX:
     """τ / τ_max of the joints that have an effort limit, by RNEA."""
     joints = limited_joints(parameters.robot)
     return generalised_forces(interval)[6 + joints] / cs.DM(parameters.robot.joint_limits.effort[joints])
+
+
+def joint_torques_pushed(interval: Interval, parameters: Parameters) -> SX:
+    """τ / τ_max of the joints that have an effort limit, by RNEA under pushes from outside."""
+    joints, limits = limited_joints(parameters.robot), parameters.robot.joint_limits.effort
+    rows = [
+        generalised_forces(interval, some)[6 + joints] / cs.DM(limits[joints]) for some, _ in pushes.groups(parameters)
+    ]
+    return cs.vertcat(cs.SX(0, 1), *rows)
 
 
 def friction_cone(knot: Knot, parameters: Parameters) -> SX:
@@ -135,6 +152,22 @@ def _limited_joint_names(parameters: Parameters) -> tuple[str, ...]:
     return tuple(parameters.robot.joint_names[index] for index in limited_joints(parameters.robot))
 
 
+def _pushed_joint_names(parameters: Parameters) -> tuple[str, ...]:
+    return _limited_joint_names(parameters) * len(pushes.groups(parameters))
+
+
+def _unpushed(parameters: Parameters) -> NDArray[np.bool_]:
+    return pushes.unpushed(parameters, limited_joints(parameters.robot).size)
+
+
+def _pushed(parameters: Parameters) -> NDArray[np.bool_]:
+    return pushes.pushed(parameters, limited_joints(parameters.robot).size)
+
+
+def _torque_asked_and_pushed(parameters: Parameters) -> bool:
+    return bool(parameters.scenario.pushes) and parameters.scenario.margins.torque > 0.0
+
+
 def _contact_names(parameters: Parameters) -> tuple[str, ...]:
     return parameters.robot.contact_names
 
@@ -155,6 +188,15 @@ JOINT_TORQUES = Constraint(
     holds=Where.EVERY_INTERVAL,
     labels=_limited_joint_names,
     when=_asked("torque"),
+    present=_unpushed,
+)
+JOINT_TORQUES_PUSHED = replace(
+    JOINT_TORQUES,
+    name="joint_torques_pushed",
+    value=joint_torques_pushed,
+    labels=_pushed_joint_names,
+    when=_torque_asked_and_pushed,
+    present=_pushed,
 )
 FRICTION_CONE = replace(paper.FRICTION_CONE, value=friction_cone)
 CENTRE_OF_PRESSURE = Constraint(
@@ -186,7 +228,7 @@ LINK_DISTANCES = Constraint(
     labels=link_pair_labels,
     when=_asked("distance"),
 )
-CONSTRAINTS = (CENTRE_OF_PRESSURE, TOUCH_DOWN, JOINT_TORQUES, LINK_DISTANCES)
+CONSTRAINTS = (CENTRE_OF_PRESSURE, TOUCH_DOWN, JOINT_TORQUES, JOINT_TORQUES_PUSHED, LINK_DISTANCES)
 COSTS = (
     paper.running(costs.throttle_rate, "%/s", Where.EVERY_INTERVAL, scale=50.0),
     paper.running(costs.joint_accelerations, JointUnits("rad/s²"), Where.EVERY_INTERVAL, scale=10.0),

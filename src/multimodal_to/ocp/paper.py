@@ -9,10 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.contact import FACES
-from multimodal_to.ocp import constraints, contacts, costs, failures, regions
+from multimodal_to.ocp import constraints, contacts, costs, failures, pushes, regions
 from multimodal_to.ocp.contacts import ON_GROUND
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.schedule import Flags
@@ -118,6 +119,26 @@ def _hovers_last(parameters: Parameters) -> bool:
     return parameters.scenario.terminal is Terminal.HOVER
 
 
+def _unpushed(parameters: Parameters) -> NDArray[np.bool_]:
+    return pushes.unpushed(parameters, len(TWIST))
+
+
+def _pushed(parameters: Parameters) -> NDArray[np.bool_]:
+    return pushes.pushed(parameters, len(TWIST))
+
+
+def _pushed_labels(parameters: Parameters) -> tuple[str, ...]:
+    return TWIST * len(pushes.groups(parameters))
+
+
+def _pushed_units(parameters: Parameters) -> tuple[str, ...]:
+    return ("m/s", "m/s", "m/s", "kg m²/s", "kg m²/s", "kg m²/s") * len(pushes.groups(parameters))
+
+
+def _is_pushed(parameters: Parameters) -> bool:
+    return bool(parameters.scenario.pushes)
+
+
 def _stands_last(parameters: Parameters) -> bool:
     return parameters.scenario.terminal is Terminal.STANDING
 
@@ -218,6 +239,16 @@ MOMENTUM_DYNAMICS = Constraint(
     unit=("m/s", "m/s", "m/s", "kg m²/s", "kg m²/s", "kg m²/s"),
     holds=Where.EVERY_INTERVAL,
     labels=TWIST,
+    present=_unpushed,
+)
+MOMENTUM_DYNAMICS_PUSHED = Constraint(
+    value=pushes.momentum_dynamics_pushed,
+    within=equal(),
+    unit=_pushed_units,
+    holds=Where.EVERY_INTERVAL,
+    labels=_pushed_labels,
+    when=_is_pushed,
+    present=_pushed,
 )
 COM_INTEGRATION = Constraint(
     value=constraints.com_integration, within=equal(), unit="m", holds=Where.EVERY_INTERVAL, labels=XYZ
@@ -384,6 +415,7 @@ CONSTRAINTS = (
     STANDING_HEIGHT,
     *contacts.CONSTRAINTS,
     *failures.CONSTRAINTS,
+    MOMENTUM_DYNAMICS_PUSHED,
     regions.ROOM,
 )
 

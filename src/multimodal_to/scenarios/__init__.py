@@ -15,6 +15,7 @@ from multimodal_to.scenarios.contacts import ContactState, ContactStretch
 from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitKind, GaitPlan
 from multimodal_to.scenarios.keyframes import FrameTarget, Keyframe, Momentum
+from multimodal_to.scenarios.pushes import KnownPush
 from multimodal_to.scenarios.regions import Box, Wall
 from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
 
@@ -28,6 +29,7 @@ __all__ = [
     "GaitPlan",
     "JetFailure",
     "Keyframe",
+    "KnownPush",
     "Margins",
     "Momentum",
     "Scenario",

@@ -28,6 +28,7 @@ from multimodal_to.scenarios.keyframes import (
     by_axis,
     contradiction,
 )
+from multimodal_to.scenarios.pushes import KnownPush
 from multimodal_to.scenarios.regions import Box, Wall
 from multimodal_to.values import FrozenMapping
 
@@ -231,6 +232,8 @@ class Scenario:
     """Steps in a pattern, which give every foot; what `contacts` says beside it holds instead."""
     failures: tuple[JetFailure, ...] = ()
     """Jets that fail, and when."""
+    pushes: tuple[KnownPush, ...] = ()
+    """Forces from outside that the plan knows of."""
     walls: tuple[Wall, ...] = ()
     """Half-spaces that the robot stays in."""
     boxes: tuple[Box, ...] = ()
@@ -240,7 +243,7 @@ class Scenario:
         check_fields(self, ScenarioError)
         object.__setattr__(self, "allowances", FrozenMapping(self.allowances))
         object.__setattr__(self, "keyframes", tuple(self.keyframes))
-        for label in ("contacts", "failures", "walls", "boxes"):
+        for label in ("contacts", "failures", "pushes", "walls", "boxes"):
             object.__setattr__(self, label, tuple(getattr(self, label)))
         self._check_name()
         self._check_numbers()

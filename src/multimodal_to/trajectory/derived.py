@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -342,7 +343,7 @@ def at_velocities(trajectory: Trajectory) -> Trajectory:
 
 
 @checked
-def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
+def generalised_forces(robot: Robot, trajectory: Trajectory, pushed: Sequence[tuple[str, Array]] = ()) -> Array:
     """Return what the motion asks of base and joints under all contact forces and thrusts, (6 + n, knots + 1).
 
     τ = M ν̇ + C ν + g − Σ Jᵀ f by RNEA: the wrench left for the base [N, N m], which is zero on a true motion, then the
@@ -352,13 +353,19 @@ def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
     of the time from middle to middle. So the velocity products there are the mean of those of both, not those of the
     mean velocity ν̄. C ν is a quadratic form c(ν), so this is ½ (c(ν⁻) + c(ν⁺)) = c(ν̄) + c(½ (ν⁺ − ν⁻)). It is what
     the momentum's rows say. With c(ν̄) alone the wrench left for the base is several times larger.
+
+    Args:
+        robot: the robot of the trajectory.
+        trajectory: the motion.
+        pushed: forces from outside beside contacts and jets: the frame and the force in world axes [N],
+            (3, knots + 1).
     """
     robot = under_conditions(robot.with_jets(trajectory.jet_names), trajectory)
     count = trajectory.time.size
     names = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
     velocities = np.vstack([at_knots(trajectory, name) for name in names])
     accelerations = np.vstack([accelerations_at_knots(trajectory, name) for name in names])
-    frames = (*trajectory.contact_names, *(jet.frame for jet in robot.jets))
+    frames = (*trajectory.contact_names, *(jet.frame for jet in robot.jets), *(frame for frame, _ in pushed))
     thrusts = thrust_forces(robot, trajectory)[1].transpose(0, 2, 1)
     contacts = at_knots(trajectory, "contact_forces").reshape(len(trajectory.contact_names), 3, count)
     asked = np.array(
@@ -371,6 +378,7 @@ def generalised_forces(robot: Robot, trajectory: Trajectory) -> Array:
             accelerations[6:],
             *(np.vstack([force, np.zeros((3, count))]) for force in contacts),
             *(np.vstack([force, jet.drag * force]) for jet, force in zip(robot.jets, thrusts, strict=True)),
+            *(np.vstack([force, np.zeros((3, count))]) for _, force in pushed),
         )
     )
     if not rules.instant(trajectory.rule, "joint_velocities"):

@@ -1,0 +1,70 @@
+"""Forces from outside that a plan knows of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from multimodal_to.arguments import check_fields
+from multimodal_to.errors import ScenarioError, shown
+from multimodal_to.trajectory import rules
+
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownPush:
+    """A constant force on a link or frame over a stretch of the horizon, which the plan counts on.
+
+    Raises:
+        ScenarioError: a number is not finite, or the stretch has no length.
+    """
+
+    of: str
+    """The link or frame, at whose origin the force acts."""
+    force: Vector3
+    """The force on the robot, in world axes [N]."""
+    begin: float = 0.0
+    """Where it begins, as a share of the horizon [1]."""
+    end: float = 1.0
+    """Where it ends, as a share of the horizon [1]."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, ScenarioError, "pushes: ")
+        if len(self.force) != 3 or not all(map(math.isfinite, self.force)):
+            raise ScenarioError(f"pushes: force is {shown(self.force)}; expected three finite numbers [N]")
+        object.__setattr__(self, "force", tuple(map(float, self.force)))
+        if not 0.0 <= self.begin < self.end <= 1.0:
+            raise ScenarioError(
+                f"pushes: begin is {shown(self.begin)} and end {shown(self.end)}; expected 0 <= begin < end <= 1, as "
+                "shares of the horizon"
+            )
+
+    def knots(self, knots: int, rule: str) -> range:
+        """Return at which knots the force acts, like a contact force, so that it acts over the whole stretch.
+
+        Under leapfrog a force of a knot acts half an interval before and after it, and the stretch is half an interval
+        early. By backward Euler it acts over the interval that ends at its knot.
+
+        Args:
+            knots: N, the number of intervals.
+            rule: name of the integration rule.
+        """
+        first, last = round(self.begin * knots), round(self.end * knots)
+        return range(first, last) if rules.acts_after(rule) else range(first + 1, last + 1)
+
+
+def acting(pushes: Sequence[KnownPush], knots: int, rule: str) -> dict[tuple[int, ...], list[int]]:
+    """Return the knots at which each set of pushes acts; knots without any are left out.
+
+    Args:
+        pushes: of a scenario.
+        knots: N, the number of intervals.
+        rule: name of the integration rule.
+    """
+    found = dict[tuple[int, ...], list[int]]()
+    for knot in range(knots + 1):
+        if some := tuple(index for index, push in enumerate(pushes) if knot in push.knots(knots, rule)):
+            found.setdefault(some, []).append(knot)
+    return found
