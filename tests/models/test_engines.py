@@ -25,7 +25,9 @@ SIDE_STEP = mt.Scenario(
     terminal=mt.Terminal.HOVER,
     interval_min=0.05,
     interval_max=0.1,
-    weights=mt.Weights(com_velocity=10.0, angular_momentum=100.0, throttle=1e-3, throttle_rate=1e-3, contact_forces=1.0),
+    weights=mt.Weights(
+        com_velocity=10.0, angular_momentum=100.0, throttle=1e-3, throttle_rate=1e-3, contact_forces=1.0
+    ),
 )
 
 
@@ -117,7 +119,9 @@ def test_a_direction_of_thrust_is_as_good_as_a_frame_that_is_turned(tmp_path):
 
 
 def test_a_frame_of_robot_toml_is_where_a_link_of_the_urdf_would_be(tmp_path):
-    robot = drone(tmp_path, more='[frames]\nnose = { link = "foot_0", position = [0.1, 0.2, 0.3], rpy = [0.3, -0.2, 0.5] }')
+    robot = drone(
+        tmp_path, more='[frames]\nnose = { link = "foot_0", position = [0.1, 0.2, 0.3], rpy = [0.3, -0.2, 0.5] }'
+    )
     base = robot.home.base_transform
     foot = np.array(robot.kindyn.forward_kinematics("foot_0", base, np.zeros(0)))
     nose = np.array(robot.kindyn.forward_kinematics("nose", base, np.zeros(0)))
@@ -128,8 +132,8 @@ def test_a_frame_of_robot_toml_is_where_a_link_of_the_urdf_would_be(tmp_path):
     about_x = np.array([[1, 0, 0], [0, np.cos(roll), -np.sin(roll)], [0, np.sin(roll), np.cos(roll)]])
     assert nose[:3, :3] == pytest.approx(about_z @ about_y @ about_x)
     assert "nose" in robot.kindyn.frame_names
+    (tmp_path / "twice").mkdir()
     with pytest.raises(ModelError, match="the frame 'foot_0' exists already"):
-        (tmp_path / "twice").mkdir()
         drone(tmp_path / "twice", more='[frames]\nfoot_0 = { link = "body" }')
 
 

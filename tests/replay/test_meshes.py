@@ -13,11 +13,11 @@ from multimodal_to import replay
 from multimodal_to.adam import KinDynComputations
 from multimodal_to.adam.urdf import parse_urdf
 from multimodal_to.errors import MultimodalError
+from multimodal_to.files.packages import package_file
 from multimodal_to.models.proportions import Gait
 from multimodal_to.models.robot import JointLimits, Posture, Robot
 from multimodal_to.replay import MeshWarning
 from multimodal_to.replay.dress import read_dress, zero_poses
-from multimodal_to.files.packages import package_file
 from multimodal_to.replay.meshes import Part, find_mesh, load_parts, shaded
 from multimodal_to.replay.visuals import FACES, appearance
 from multimodal_to.trajectory import QUANTITIES, Trajectory

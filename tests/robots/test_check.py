@@ -46,9 +46,17 @@ def test_all_names_that_the_urdf_lacks_are_named_at_once(tmp_path):
         tmp_path,
         a=('frame = "jet_left"', 'frame = "jet_lef"'),
         b=("'foot_0'", "'fot_0'"),
-        c=("[joint_groups]", "whip = { lower = -1.0, upper = 1.0, speed = 1.0, home = 0.0 }\n[joint_groups]\nall = ['x']"),
+        c=(
+            "[joint_groups]",
+            "whip = { lower = -1.0, upper = 1.0, speed = 1.0, home = 0.0 }\n[joint_groups]\nall = ['x']",
+        ),
     )
-    for part in ("unknown frame 'jet_lef'", "unknown frame 'fot_0'", "unknown joint 'whip'", "'all': unknown joint 'x'"):
+    for part in (
+        "unknown frame 'jet_lef'",
+        "unknown frame 'fot_0'",
+        "unknown joint 'whip'",
+        "'all': unknown joint 'x'",
+    ):
         assert part in found.fault
 
 
@@ -75,4 +83,5 @@ def test_a_picture_shows_every_contact_point_where_it_is(name):
     points = [np.array(robot.kindyn.forward_kinematics(frame, *pose))[:3, 3] for frame in robot.contact_names]
     for axes in figure.axes:
         (dots,) = (artist for artist in axes.collections if isinstance(artist, PathCollection))
-        assert np.array(dots._offsets3d).T == pytest.approx(np.array(points))
+        drawn = np.array(dots._offsets3d).T
+        assert drawn == pytest.approx(np.array(points))

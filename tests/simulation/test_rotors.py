@@ -18,7 +18,9 @@ def test_the_drag_of_a_rotor_turns_the_body_as_its_moment_over_its_inertia():
     robot = mt.load_robot("quadrotor")
     mujoco, model = mujoco_module(), build_model(robot)
     data = mujoco.MjData(model.model)
-    model.set_state(data, np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(0), np.zeros(6), np.zeros(0))
+    model.set_state(
+        data, np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(0), np.zeros(6), np.zeros(0)
+    )
     data.ctrl[:] = [4.0, 0.0, 4.0, 0.0]  # two that turn the same way
     mujoco.mj_forward(model.model, data)
     about_z = 8.0 * 0.016 / 0.0245
