@@ -147,7 +147,7 @@ def completions(line, folder):
         ("multimodal-to reproduce take-off st", ["step-up"]),
         ("multimodal-to plot a.npz --figure m", ["momentum", "margins"]),
         ("multimodal-to export a.npz --to m", ["mat", "mujoco", "motion"]),
-        ("multimodal-to robot info i", ["ironcub"]),
+        ("multimodal-to robot info i", ["ironcub", "ironcub-mk3"]),
         ("multimodal-to audit a.npz --robot r", ["robots/"]),
     ],
 )

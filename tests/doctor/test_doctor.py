@@ -311,9 +311,11 @@ def test_a_robot_without_jets_may_stand(tmp_path):
     assert not examined(robot, standing).hopeless
 
 
-def test_a_robot_without_feet_is_refused(tmp_path):
-    (error,) = mt.doctor(replace(drone(tmp_path), contacts=()), hop(start=Start.HOVER)).of(Severity.ERROR)
+def test_a_robot_without_feet_is_refused_where_it_has_to_stand_and_only_there(tmp_path):
+    robot = replace(drone(tmp_path), contacts=())
+    (error,) = mt.doctor(robot, hop()).of(Severity.ERROR)
     assert error.name == "contacts"
+    assert not mt.doctor(robot, hop(start=Start.HOVER)).hopeless
 
 
 # ------------------------------------------------------------------------------------------ the command line

@@ -132,8 +132,8 @@ def test_a_frame_of_robot_toml_is_where_a_link_of_the_urdf_would_be(tmp_path):
     about_x = np.array([[1, 0, 0], [0, np.cos(roll), -np.sin(roll)], [0, np.sin(roll), np.cos(roll)]])
     assert nose[:3, :3] == pytest.approx(about_z @ about_y @ about_x)
     assert "nose" in robot.kindyn.frame_names
+    (tmp_path / "twice").mkdir()
     with pytest.raises(ModelError, match="the frame 'foot_0' exists already"):
-        (tmp_path / "twice").mkdir()
         drone(tmp_path / "twice", more='[frames]\nfoot_0 = { link = "body" }')
 
 

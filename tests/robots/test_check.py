@@ -83,4 +83,5 @@ def test_a_picture_shows_every_contact_point_where_it_is(name):
     points = [np.array(robot.kindyn.forward_kinematics(frame, *pose))[:3, 3] for frame in robot.contact_names]
     for axes in figure.axes:
         (dots,) = (artist for artist in axes.collections if isinstance(artist, PathCollection))
-        assert pytest.approx(np.array(points)) == np.array(dots._offsets3d).T
+        drawn = np.array(dots._offsets3d).T
+        assert drawn == pytest.approx(np.array(points))

@@ -21,6 +21,9 @@ LIFT = 0.07
 SWING = 0.65
 """Which share of a step's time its foot is in the air by default [1]."""
 
+MOST_EFFORT = 20.0
+"""No joint gives more torque than this, whatever a URDF says [m g L]; the strongest legs give less than one."""
+
 PLUME_RADIUS = 0.1
 """Radius of a plume by default, as a share of its length: the half-width of a free round jet grows by about so much."""
 

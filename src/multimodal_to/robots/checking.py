@@ -12,6 +12,7 @@ from multimodal_to.adam.inspection import describe
 from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
 from multimodal_to.errors import ModelError, listed
+from multimodal_to.models import proportions
 from multimodal_to.models.robot import Robot, load_robot
 
 LEVEL = 0.01
@@ -49,7 +50,8 @@ def check(robot: str | os.PathLike[str]) -> Check:
 def _remarks(robot: Robot) -> Iterator[str]:
     yield from _of_urdf(robot)
     limits, names = robot.joint_limits, np.array(robot.joint_names, dtype=np.str_)
-    if unknown := names[~np.isfinite(limits.effort)].tolist():
+    most = proportions.MOST_EFFORT * robot.weight * robot.standing_height
+    if unknown := names[~(limits.effort <= most)].tolist():
         yield f"no effort limit is known of {_some(unknown)}: state `effort`, or torques are not judged"
     at_end = np.minimum(robot.home.joint_positions - limits.lower, limits.upper - robot.home.joint_positions) <= 0
     if ends := names[at_end].tolist():

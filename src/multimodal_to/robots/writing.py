@@ -9,13 +9,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from multimodal_to.adam.inspection import is_placeholder
+from multimodal_to.models import proportions
 from multimodal_to.robots.drafting import Draft
 
 EFFORT = {"legs": 0.4, "torso": 0.4}
 """Proposed effort of a joint whose URDF states none, by group [m g L]."""
 EFFORT_OF_OTHERS = 0.1  # [m g L]
-MOST_EFFORT = 20.0
-"""No joint of a robot gives more than this, whatever its URDF says [m g L]."""
 THRUST = 2.0
 """Guessed thrust of all jets together [m g]."""
 TIME_CONSTANT = 0.3
@@ -56,7 +55,7 @@ def _joints(draft: Draft) -> Iterator[str]:
     weight_times_height = draft.kindyn.get_total_mass() * _GRAVITY * draft.standing_height
     for joint, of, home in zip(draft.joints, draft.ranges, draft.home, strict=True):
         guesses = list(of.guesses)
-        far_too_much = joint.effort > MOST_EFFORT * weight_times_height
+        far_too_much = joint.effort > proportions.MOST_EFFORT * weight_times_height
         if is_placeholder(joint.effort) or not np.isfinite(joint.effort) or far_too_much:
             share = next(
                 (share for group, share in EFFORT.items() if joint.name in draft.groups.get(group, ())),
