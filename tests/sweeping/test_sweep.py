@@ -247,7 +247,13 @@ def test_another_sweep_does_not_go_into_the_folder_of_one(tmp_path, monkeypatch)
 
 
 def test_draws_follow_from_the_seed_and_the_index_and_stay_in_their_range():
-    design = small(draws=50, seed=3, between={"friction": (0.25, 0.6)}, among={"weights.thrust": (1.0, 2.0)})
+    ranges = {"friction": (0.25, 0.6), "final_com": ((-0.1, 0.0, 0.5), (0.1, 0.0, 0.6))}
+    design = small(draws=50, seed=3, between=ranges, among={"weights.thrust": (1.0, 2.0)})
+    for x, y, z in (row.scenario["final_com"] for row in design.rows()):
+        assert -0.1 < x < 0.1
+        assert y == 0.0
+        assert 0.5 < z < 0.6
+    assert Design.of_plain(json.loads(json.dumps(design.plain()))) == design
     rows, again = list(design.rows()), list(design.rows())
     assert [row.inputs for row in rows] == [row.inputs for row in again]
     drawn = np.array([row.inputs["friction"] for row in rows])

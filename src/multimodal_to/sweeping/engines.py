@@ -11,6 +11,7 @@ import tempfile
 import threading
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import IO, Any, Protocol
 
 from multimodal_to.errors import InputError, OutputError
@@ -20,6 +21,7 @@ from multimodal_to.sweeping.worker import READY
 GRACE = 60.0
 """A plan may take so much longer than its time limit, to be built and audited, before its process is killed [s]."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_HERE = str(Path(__file__).resolve().parents[2])  # the package may have been found in any way
 _STILLBORN = 20  # so many processes may die while none becomes ready
 _LAST_WORDS = 400  # characters of what a process wrote before it died
 
@@ -75,7 +77,11 @@ class _Worker:
             stderr=self.errors,
             text=True,
             encoding="utf-8",
-            env={**dict.fromkeys(_THREADS, "1"), **os.environ},
+            env={
+                **dict.fromkeys(_THREADS, "1"),
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join(filter(None, (_HERE, os.environ.get("PYTHONPATH")))),
+            },
         )
         threading.Thread(target=self._listen, args=(answers,), daemon=True).start()
 
