@@ -58,7 +58,7 @@ class Design:
     listed: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)  # entry by entry
     draws: int = 1  # of the random keys, for each combination
     seed: int = 0
-    between: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # uniform
+    between: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)  # uniform; numbers, or tuples of them
     among: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)  # each as likely
 
     def __post_init__(self) -> None:
@@ -74,8 +74,8 @@ class Design:
             lengths = ", ".join(f"{key} {len(values)}" for key, values in self.listed.items())
             raise InputError(f"the lists differ in length: {lengths}")
         for key, (low, high) in self.between.items():
-            if not low <= high:
-                raise InputError(f"'{key}' is between {low:g} and {high:g}; expected two numbers that rise")
+            if np.shape(low) != np.shape(high) or not (np.array(low) <= np.array(high)).all():
+                raise InputError(f"'{key}' is between {shown(low)} and {shown(high)}; expected numbers that rise")
         if self.draws < 1 or not self.scenarios or not self.robots:
             raise InputError("a sweep has at least one scenario, one robot and one draw")
         if self.count > MOST_ROWS:
@@ -120,7 +120,7 @@ class Design:
 
     def _drawn(self, index: int) -> dict[str, Any]:
         rng = np.random.default_rng([self.seed, index])
-        drawn: dict[str, Any] = {key: float(rng.uniform(low, high)) for key, (low, high) in self.between.items()}
+        drawn: dict[str, Any] = {key: np.asarray(rng.uniform(*ends)).tolist() for key, ends in self.between.items()}
         return drawn | {key: some[int(rng.integers(len(some)))] for key, some in self.among.items()}
 
     def _row(self, index: int, scenario: Scenario, robot: str, inputs: Mapping[str, Any]) -> Row:
@@ -167,12 +167,16 @@ class Design:
     def of_plain(cls, table: Mapping[str, Any]) -> Design:
         """Return the sweep that `plain` made data of."""
         of_lists = {
-            key: {name: tuple(values) for name, values in table[key].items()}
+            key: {name: tuple(map(_tuple, values)) for name, values in table[key].items()}
             for key in ("grid", "listed", "between", "among")
         }
         scenarios = tuple(from_dict(scenario) for scenario in table["scenarios"])
         plain: dict[str, Any] = {key: table[key] for key in ("settings", "draws", "seed")} | of_lists
         return cls(scenarios=scenarios, robots=tuple(table["robots"]), **plain)
+
+
+def _tuple(value: Any) -> Any:
+    return tuple(map(_tuple, value)) if isinstance(value, list) else value
 
 
 def nested(changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -215,7 +219,7 @@ def read_design(path: str | os.PathLike[str]) -> Design:
     [random]
     draws = 500
     seed = 1
-    between = { friction = [0.25, 0.6] }
+    between = { friction = [0.25, 0.6], final_com = [[-0.2, 0.0, 0.65], [0.2, 0.0, 0.75]] }
     among = { "weights.thrust" = [1.0, 3.0] }
     ```
 
@@ -303,7 +307,10 @@ def _values(key: str, value: Any) -> tuple[Any, ...]:
     raise InputError(f"'{key}' is {shown(value)}; expected a list of values, or {{ from = 0.7, to = 0.9, count = 3 }}")
 
 
-def _range(key: str, value: Any) -> tuple[float, float]:
-    if not (isinstance(value, list) and len(value) == 2 and all(map(is_number, value))):
-        raise InputError(f"'{key}' is between {shown(value)}; expected two numbers")
-    return float(value[0]), float(value[1])
+def _range(key: str, value: Any) -> tuple[Any, Any]:
+    if isinstance(value, list) and len(value) == 2:
+        if all(map(is_number, value)):
+            return float(value[0]), float(value[1])
+        if all(isinstance(end, list) and end and all(map(is_number, end)) for end in value):
+            return tuple(map(float, value[0])), tuple(map(float, value[1]))
+    raise InputError(f"'{key}' is between {shown(value)}; expected two numbers, or two lists of them")

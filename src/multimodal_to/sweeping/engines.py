@@ -11,6 +11,7 @@ import tempfile
 import threading
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import IO, Any, Protocol
 
 from multimodal_to.errors import InputError, OutputError
@@ -20,6 +21,8 @@ from multimodal_to.sweeping.worker import READY
 GRACE = 60.0
 """A plan may take so much longer than its time limit, to be built and audited, before its process is killed [s]."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_HERE = str(Path(__file__).resolve().parents[2])  # the package may have been found in any way
+_STILLBORN = 20  # so many processes may die while none becomes ready
 _LAST_WORDS = 400  # characters of what a process wrote before it died
 
 
@@ -74,7 +77,11 @@ class _Worker:
             stderr=self.errors,
             text=True,
             encoding="utf-8",
-            env={**dict.fromkeys(_THREADS, "1"), **os.environ},
+            env={
+                **dict.fromkeys(_THREADS, "1"),
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join(filter(None, (_HERE, os.environ.get("PYTHONPATH")))),
+            },
         )
         threading.Thread(target=self._listen, args=(answers,), daemon=True).start()
 
@@ -125,6 +132,7 @@ class Processes:
         self._workers: dict[int, _Worker] = {}
         self._answers: queue.Queue[tuple[int, dict[str, Any] | None]] = queue.Queue()
         self._slots, self._started = workers, 0
+        self._stillborn = 0  # processes that died since one was ready
 
     @property
     def slots(self) -> int:
@@ -155,9 +163,9 @@ class Processes:
                     return late
                 continue
             worker = self._workers.get(number)
-            if worker is None or (answer is not None and READY in answer):
-                continue
-            if (ended := self._ended(worker, answer)) is not None:
+            if answer is not None and READY in answer:
+                self._stillborn = 0
+            elif worker is not None and (ended := self._ended(worker, answer)) is not None:
                 return [ended]
 
     def close(self) -> None:
@@ -179,6 +187,9 @@ class Processes:
         if answer is None:  # the process is gone
             status, words = worker.process.wait(), worker.last_words()
             self._drop(worker)
+            self._stillborn += 1
+            if self._stillborn > _STILLBORN:
+                raise OutputError(f"processes for plans end before they begin: {words}")
             if order is None:
                 return None
             message = f"its process ended with status {status}{': ' if words else ''}{words}"

@@ -32,6 +32,7 @@ FACTS = (
     "objective",
     "solve_seconds",
     "seconds",
+    "cpu_seconds",
     "started_from",
     "message",
     "plan",
@@ -59,7 +60,7 @@ Columns: `status` is how the solve ended, or `refused` (the task contradicts its
 `audit_worst` is the property that is nearest to its limit, or beyond it, and `audit_worst_over_limit` its share of the
 limit. `survived` says whether the robot stands or hovers at the end in MuJoCo, and is empty where that was not asked.
 `started_from` is the index of the plan whose answer this one started from. `attempts` counts workers that were lost on
-it. Times are wall times [s].
+it. Times are wall times [s], and `cpu_seconds` that of the processor.
 """
 
 

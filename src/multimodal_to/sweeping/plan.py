@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+import json
 import platform
 import subprocess
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from functools import cache
+from dataclasses import asdict, dataclass, replace
+from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.errors import LONGEST, MultimodalError, said, shortened
-from multimodal_to.models.robot import load_robot
-from multimodal_to.ocp import build
-from multimodal_to.scenarios.data import from_dict
+from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.ocp import Problem, build
+from multimodal_to.ocp.rebinding import rebind, same_terms
+from multimodal_to.scenarios.data import from_dict, to_json
+from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.solving import Ipopt, solve
 from multimodal_to.sweeping.design import Row
 from multimodal_to.sweeping.folder import Folder
 from multimodal_to.sweeping.variants import variant
 from multimodal_to.trajectory import Trajectory
 
+_BOUND = ("final_com", "mid_height_min", "interval_min", "interval_max")
+"""What of a scenario is a bound of its problem alone: `ocp.rebinding`."""
+_KEPT = 4  # robots and problems that a process keeps
 REFUSED, CRASHED, TIMED_OUT = "refused", "crashed", "timed out"
 """What a row says of a plan that no solver ended: the task contradicts itself, its process died, it took too long."""
 
@@ -34,6 +40,7 @@ class Order:
     row: Row
     folder: str
     started_from: int | None  # index of the plan to start from; None: the start guess
+    base: Mapping[str, Any]  # scenario of the plan at the beginning of its tree, whose problem neighbours share
     time_limit: float  # of a solve [s]
     simulate: bool
     attempts: int
@@ -60,7 +67,7 @@ def perform(order: Order) -> dict[str, Any]:
     Raises:
         OutputError: the trajectory or the row cannot be written; the plan is not done then.
     """
-    started, folder = time.perf_counter(), Folder(path=Path(order.folder))
+    started, worked, folder = time.perf_counter(), time.process_time(), Folder(path=Path(order.folder))
     found: dict[str, Any] = {}
     plan = None
     try:
@@ -74,6 +81,7 @@ def perform(order: Order) -> dict[str, Any]:
         file.parent.mkdir(parents=True, exist_ok=True)
         plan.save(file)
         found["plan"] = str(file.relative_to(folder.path))
+    found["cpu_seconds"] = time.process_time() - worked
     row = row_of(order, found, seconds=time.perf_counter() - started)
     folder.write_row(row)
     return row
@@ -106,10 +114,12 @@ def row_of(order: Order, found: Mapping[str, Any], *, seconds: float) -> dict[st
 
 def _made(order: Order, folder: Folder) -> tuple[Trajectory, dict[str, Any]]:
     row = order.row
-    source = Path(variant(row.robot, row.robot_changes, folder.robots)) if row.robot_changes else None
-    scenario = from_dict(row.scenario)
-    problem = build(load_robot(row.robot if source is None else source), scenario)
-    start = None if order.started_from is None else Trajectory.load(folder.plan(order.started_from))
+    source = variant(row.robot, row.robot_changes, folder.robots) if row.robot_changes else None
+    scenario, robot = from_dict(row.scenario), row.robot if source is None else str(source)
+    if order.started_from is None:
+        problem, start = build(_robot(robot), scenario), None
+    else:
+        problem, start = _bound(robot, scenario, order.base), Trajectory.load(folder.plan(order.started_from))
     solution = solve(problem, Ipopt(time_limit=order.time_limit), start=start)
     report = audit(problem.robot, solution.trajectory, scenario)
     name, share = worst_of(report)
@@ -131,6 +141,33 @@ def _made(order: Order, folder: Folder) -> tuple[Trajectory, dict[str, Any]]:
         end = simulation.tracking(simulation.play(problem.robot, solution.trajectory)).end
         found |= {"survived": end in ("stands", "hovers"), "simulated_end": end}
     return solution.trajectory, found
+
+
+@lru_cache(maxsize=_KEPT)
+def _robot(robot: str) -> Robot:
+    return load_robot(robot)
+
+
+def _bound(robot: str, scenario: Scenario, base: Mapping[str, Any]) -> Problem:
+    """Return the problem of a scenario whose start guess is not used: where it can be, a base's with other bounds.
+
+    The base is the same for every plan of a tree, so what comes out does not depend on what the process made before.
+
+    Args:
+        robot: bundled one by name, or a folder.
+        scenario: of the plan.
+        base: scenario of the plan at the beginning of its tree.
+    """
+    first = from_dict(base)
+    shared = replace(scenario, **{name: getattr(first, name) for name in _BOUND})
+    if not same_terms(scenario, shared):
+        return build(_robot(robot), scenario)
+    return rebind(_built(robot, to_json(shared)), scenario)
+
+
+@lru_cache(maxsize=_KEPT)
+def _built(robot: str, scenario: str) -> Problem:
+    return build(_robot(robot), from_dict(json.loads(scenario)))
 
 
 def worst_of(report: Audit) -> tuple[str, float]:

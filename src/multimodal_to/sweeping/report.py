@@ -48,7 +48,9 @@ def write_sweep_report(folder: str | os.PathLike[str]) -> Path:
             summary=html.escape(f"{len(rows)} of {design.count} plans are done"),
             verdicts="".join(_cells(name, count, f"{100 * count / len(rows):.1f} %") for name, count in counts.items()),
             figures=_figures(rows, keys),
-            head="".join(f"<th>{html.escape(name)}</th>" for name in (*_columns(keys), "why")),
+            head="".join(
+                f"<th>{html.escape(name)}</th>" for name in (*_columns(keys), "why, or what is nearest to its limit")
+            ),
             rows="".join(_row(row, keys) for row in first[:_SHOWN]),
             left_out=f"The table has {len(rows) - _SHOWN} rows more." if len(rows) > _SHOWN else "",
         ),

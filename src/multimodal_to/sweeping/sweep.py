@@ -186,13 +186,16 @@ class _Run:
                 self._take(ended)
 
     def _order(self, row: Row) -> Order:
-        origin = self._origins[row.index]
+        origin = root = self._origins[row.index]
+        while root is not None and self._origins[root] is not None:
+            root = self._origins[root]
         while origin is not None and not self._solved[origin]:
             origin = self._origins[origin]
         return Order(
             row=row,
             folder=str(self._folder.path.resolve()),
             started_from=origin,
+            base=self._rows[row.index if root is None else root].scenario,
             time_limit=self._time_limit,
             simulate=self._simulate,
             attempts=self._attempts.get(row.index, 0),
