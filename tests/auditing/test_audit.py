@@ -14,7 +14,7 @@ from multimodal_to.auditing.properties import judged
 from multimodal_to.errors import InputError
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.terrain import FlatGround, Plane, Stairs
-from multimodal_to.scenarios import Start, Terminal
+from multimodal_to.scenarios import ContactState, ContactStretch, JetFailure, Start, Terminal, Wall
 from multimodal_to.trajectory import rules
 from synthetic import take_off as take_off_by_hand
 
@@ -157,6 +157,9 @@ CHANGES = {
     "to a stand": {"terminal": Terminal.STANDING},
     "to a free end": {"terminal": Terminal.FREE},
     "over the middle": {"mid_height_min": 0.6},
+    "with contacts": {"contacts": (ContactStretch(of="left", state=ContactState.ON, end=0.5),)},
+    "with a jet that fails": {"failures": (JetFailure(jet="left arm", at=0.5),)},
+    "under a ceiling": {"walls": (Wall(normal=(0.0, 0.0, -1.0), offset=-2.0),)},
 }
 
 
