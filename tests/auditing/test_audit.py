@@ -14,7 +14,17 @@ from multimodal_to.auditing.properties import judged
 from multimodal_to.errors import InputError
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.terrain import FlatGround, Plane, Stairs
-from multimodal_to.scenarios import FrameTarget, Keyframe, Momentum, Start, Terminal
+from multimodal_to.scenarios import (
+    ContactState,
+    ContactStretch,
+    FrameTarget,
+    JetFailure,
+    Keyframe,
+    Momentum,
+    Start,
+    Terminal,
+    Wall,
+)
 from multimodal_to.trajectory import rules
 from synthetic import take_off as take_off_by_hand
 
@@ -168,6 +178,9 @@ CHANGES = {
             Keyframe(knot=40, com={"z": 0.9}, weight=1.0),
         ),
     },
+    "with contacts": {"contacts": (ContactStretch(of="left", state=ContactState.ON, end=0.5),)},
+    "with a jet that fails": {"failures": (JetFailure(jet="left arm", at=0.5),)},
+    "under a ceiling": {"walls": (Wall(normal=(0.0, 0.0, -1.0), offset=-2.0),)},
 }
 
 
