@@ -30,21 +30,30 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.simulation.model import SimulationModel, mujoco_module
 from multimodal_to.simulation.reference import Reference
+from multimodal_to.simulation.units import Units
 from multimodal_to.trajectory.derived import flight_force
 
-COM_STIFFNESS, COM_DAMPING = 6.0, 5.0  # K_x [1/s²], D_x [1/s]
-ATTITUDE_STIFFNESS, ATTITUDE_DAMPING = 16.0, 8.0  # K_R [1/s²], D_h [1/s]
-RADIUS = 0.1  # r: a stance bears half of a moment about an axis from which its points stand so far [m]
-LEAN_MAX = 0.05  # [rad]
-THRUST_SPREAD = 20.0  # σ_T: of a thrust in flight [N]
-LOAD_SPREAD = 0.5  # σ of a contact force, as a share of the planned load of its point [1]
-JOINT_SPREAD = 0.1  # σ of a joint in flight [rad]
+# Weights of the horizontal forces, the vertical one [1/(m g)], and the moments [1/(m g L)].
+THRUST_WEIGHTS = np.array([130.0, 130.0, 440.0, 1250.0, 1250.0, 1250.0])
+FORCE_WEIGHTS = np.array([440.0, 440.0, 440.0, 1250.0, 1250.0, 1250.0])
+JOINT_WEIGHTS = np.array([440.0, 440.0, 130.0, 1250.0, 1250.0, 1250.0])
 JOINT_MAX = 0.3  # how far a joint leaves the plan [rad]
-# Weights of the horizontal forces, the vertical one [1/N], and the moments [1/(N m)].
-THRUST_WEIGHTS = np.array([0.3, 0.3, 1.0, 5.0, 5.0, 5.0])
-FORCE_WEIGHTS = np.array([1.0, 1.0, 1.0, 5.0, 5.0, 5.0])
-JOINT_WEIGHTS = np.array([1.0, 1.0, 0.3, 5.0, 5.0, 5.0])
 _MOMENTS = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class BalanceGains:
+    """The numbers of the stabiliser, in the robot's own units: m, g and L, the height of its CoM at home."""
+
+    com_stiffness: float = 1.5  # K_x [g/L]; below 1 it does not hold an inverted pendulum
+    com_damping: float = 1.6  # D_x [√(g/L)]
+    attitude_stiffness: float = 0.94  # K_R [g/L]
+    attitude_damping: float = 1.94  # D_h [√(g/L)]
+    radius: float = 0.173  # r: a stance bears half of a moment about an axis from which its points stand so far [L]
+    thrust_spread: float = 0.0456  # σ_T: of a thrust in flight [m g]
+    load_spread: float = 0.5  # σ of a contact force, as a share of the planned load of its point [1]
+    joint_spread: float = 0.1  # σ of a joint in flight [rad]
+    lean_max: float = 0.05  # how far the base leans to move aside in flight [rad]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,14 +83,27 @@ class Turbines:
     at_least: NDArray[np.bool_]
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Balance:
+    """What the stabiliser knows of the robot."""
+
+    gains: BalanceGains
+    units: Units
+    inertia: Array  # I about the CoM in the base's axes [kg m²], (3, 3)
+    friction: float  # Coulomb's μ [1]
+
+    def weights(self, own: Array) -> Array:
+        """Return weights of forces [1/N] and moments [1/(N m)] from those in the robot's own units, (6,)."""
+        return own / np.repeat([self.units.force, self.units.moment], 3)
+
+
 def correct(
     simulation: SimulationModel,
     data: Any,
     plan: Reference,
     step: int,
     turbines: Turbines,
-    inertia: Array,
-    friction: float,
+    balance: Balance,
 ) -> Correction:
     """Return what to add to step `step` of the plan in the state of `data`.
 
@@ -91,10 +113,9 @@ def correct(
         plan: on the grid of the simulation.
         step: row of the plan.
         turbines: the jets as they are.
-        inertia: I about the CoM in the base's axes [kg m²], (3, 3).
-        friction: Coulomb's μ [1].
+        balance: gains, and what else is known of the robot.
     """
-    robot = simulation.robot
+    robot, gains = simulation.robot, balance.gains
     com, points = data.subtree_com[1], data.geom_xpos[simulation.points]
     loads = np.maximum(plan.contact_forces[step][:, 2], 0.0)
     feet = np.array([contact.foot for contact in robot.contacts], dtype=np.str_)
@@ -102,30 +123,29 @@ def correct(
     touches = same_foot @ np.isin(simulation.points, data.contact.geom)
     standing = np.flatnonzero((same_foot @ loads > flight_force(robot)) & touches)  # loaded by the plan
     stands, load = bool(standing.size), float(loads[standing].sum())
-    free = max(0.0, 1.0 - load / robot.weight)
-    wanted = _wanted(simulation, data, plan, step, inertia, free)
+    free = max(0.0, 1.0 - load / balance.units.force)
+    wanted = _wanted(simulation, data, plan, step, balance, free)
 
     origin = loads[standing] @ points[standing] / load if stands else com
     rows = _MOMENTS if stands else np.ones(6)
     whole = _about(origin, com, wanted)
     asked = whole.copy()
     if stands:
-        asked[3:] = _unborne(points[standing] - origin, loads[standing] / load) @ whole[3:]
-    spread = THRUST_SPREAD * free**2
-    thrust, missing = _thrusts(
-        simulation, data, asked, origin, turbines, plan.thrust[step], spread, THRUST_WEIGHTS * rows
-    )
+        radius = gains.radius * balance.units.length
+        asked[3:] = _unborne(points[standing] - origin, loads[standing] / load, radius) @ whole[3:]
+    spread, weights = gains.thrust_spread * balance.units.force * free**2, balance.weights(THRUST_WEIGHTS * rows)
+    thrust, missing = _thrusts(simulation, data, asked, origin, turbines, plan.thrust[step], spread, weights)
 
     forces = np.zeros((len(robot.contacts), 3))
     if stands:
         lacking = _about(com, origin, missing + whole - asked)
         forces[standing] = _contact_forces(
-            plan.contact_forces[step][standing], points[standing] - com, lacking, friction
+            plan.contact_forces[step][standing], points[standing] - com, lacking, balance
         )
     joints = np.zeros(len(robot.joint_names))
     if robot.jets and free > 0.0:
         effect = _effect_of_joints(simulation, data, origin, turbines.thrust, stands=stands)
-        joints = _ridge(effect, missing, np.full(joints.size, free * JOINT_SPREAD), JOINT_WEIGHTS * rows)
+        joints = _ridge(effect, missing, np.full(joints.size, free * gains.joint_spread), balance.weights(JOINT_WEIGHTS * rows))
     return Correction(thrust=thrust, contact_forces=forces, joints=np.clip(joints, -JOINT_MAX, JOINT_MAX))
 
 
@@ -138,7 +158,9 @@ def rotation_vector(rotation: Array) -> Array:
     return vector
 
 
-def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, inertia: Array, free: float) -> Array:
+def _wanted(
+    simulation: SimulationModel, data: Any, plan: Reference, step: int, balance: Balance, free: float
+) -> Array:
     """Return Δl̇ [N] and Δḣω [N m] about the CoM, (6,).
 
     Args:
@@ -146,19 +168,21 @@ def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, 
         data: MuJoCo's `MjData` of it.
         plan: on the grid of the simulation.
         step: row of the plan.
-        inertia: I about the CoM in the base's axes [kg m²], (3, 3).
+        balance: gains, and what else is known of the robot.
         free: share of the weight that the ground does not carry, from 0 to 1.
     """
-    robot = simulation.robot
+    robot, gains, units = simulation.robot, balance.gains, balance.units
+    rate = units.frequency
     away, slow = plan.com[step] - data.subtree_com[1], plan.com_velocity[step] - data.subtree_linvel[1]
-    linear = robot.mass * (COM_STIFFNESS * away + COM_DAMPING * slow)
-    carried = float(np.clip(plan.thrust[step] @ _axes(simulation, data)[:, 2] / robot.weight, 0.0, 1.0))
-    lean = free * carried * np.cross([0.0, 0.0, 1.0], linear) / robot.weight
-    lean *= min(1.0, LEAN_MAX / max(float(np.linalg.norm(lean)), 1e-9))
+    linear = robot.mass * (gains.com_stiffness * rate**2 * away + gains.com_damping * rate * slow)
+    carried = float(np.clip(plan.thrust[step] @ _axes(simulation, data)[:, 2] / units.force, 0.0, 1.0))
+    lean = free * carried * np.cross([0.0, 0.0, 1.0], linear) / units.force
+    lean *= min(1.0, gains.lean_max / max(float(np.linalg.norm(lean)), 1e-9))
     turn = lean + rotation_vector(plan.rotation[step] @ data.xmat[1].reshape(3, 3).T)  # both small
     spin = plan.angular_momentum[step] - data.subtree_angmom[1]
-    world = plan.rotation[step] @ inertia @ plan.rotation[step].T
-    return np.concatenate([linear, ATTITUDE_STIFFNESS * world @ turn + ATTITUDE_DAMPING * spin])
+    world = plan.rotation[step] @ balance.inertia @ plan.rotation[step].T
+    angular = gains.attitude_stiffness * rate**2 * world @ turn + gains.attitude_damping * rate * spin
+    return np.concatenate([linear, angular])
 
 
 def _about(origin: Array, before: Array, wrench: Array) -> Array:
@@ -172,13 +196,18 @@ def _about(origin: Array, before: Array, wrench: Array) -> Array:
     return np.concatenate([wrench[:3], wrench[3:] + _skew(before - origin) @ wrench[:3]])
 
 
-def _unborne(arms: Array, shares: Array) -> Array:
+def _unborne(arms: Array, shares: Array, radius: float) -> Array:
     """Return B = r² (C + r² 1)⁻¹, (3, 3): which part of a moment a stance leaves to others.
 
     C = Σ share_i (a_i × e_j) · (a_i × e_k) is how far loaded points stand from each axis through their middle [m²].
+
+    Args:
+        arms: a, from there to the points [m], (points, 3).
+        shares: of the load that each carries [1], (points,).
+        radius: r [m].
     """
     spread = sum(share * _skew(arm).T @ _skew(arm) for arm, share in zip(arms * [1.0, 1.0, 0.0], shares, strict=True))
-    return np.asarray(RADIUS**2 * np.linalg.inv(spread + RADIUS**2 * np.eye(3)))
+    return np.asarray(radius**2 * np.linalg.inv(spread + radius**2 * np.eye(3)))
 
 
 def _axes(simulation: SimulationModel, data: Any) -> Array:
@@ -219,18 +248,19 @@ def _thrusts(
     return change, wanted - wrenches @ off
 
 
-def _contact_forces(planned: Array, arms: Array, wanted: Array, friction: float) -> Array:
+def _contact_forces(planned: Array, arms: Array, wanted: Array, balance: Balance) -> Array:
     """Return Δf of contact points with planned forces and arms from the CoM, (points, 3).
 
     Args:
         planned: forces of the plan in world axes [N], (points, 3).
         arms: from the CoM to the points, world axes [m], (points, 3).
         wanted: change of force [N] and moment [N m] about the CoM, world axes, (6,).
-        friction: Coulomb's μ [1].
+        balance: gains, and what else is known of the robot.
     """
+    friction = balance.friction
     wrenches = np.hstack([np.vstack([np.eye(3), _skew(arm)]) for arm in arms])
-    spread = (LOAD_SPREAD * planned[:, 2:] * [friction, friction, 1.0]).ravel()
-    total = planned + _ridge(wrenches, wanted, spread, FORCE_WEIGHTS).reshape(-1, 3)
+    spread = (balance.gains.load_spread * planned[:, 2:] * [friction, friction, 1.0]).ravel()
+    total = planned + _ridge(wrenches, wanted, spread, balance.weights(FORCE_WEIGHTS)).reshape(-1, 3)
     total[:, 2] = np.maximum(total[:, 2], 0.0)
     reach = friction * total[:, 2:]
     total[:, :2] = np.clip(total[:, :2], -reach, reach)
