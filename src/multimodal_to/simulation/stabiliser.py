@@ -144,7 +144,7 @@ def correct(
         )
     joints = np.zeros(len(robot.joint_names))
     if robot.jets and free > 0.0:
-        effect = _effect_of_joints(simulation, data, origin, turbines.thrust, stands=stands)
+        effect = effect_of_joints(simulation, data, origin, turbines.thrust, stands=stands)
         joints = _ridge(effect, missing, np.full(joints.size, free * gains.joint_spread), balance.weights(JOINT_WEIGHTS * rows))
     return Correction(thrust=thrust, contact_forces=forces, joints=np.clip(joints, -JOINT_MAX, JOINT_MAX))
 
@@ -267,7 +267,7 @@ def _contact_forces(planned: Array, arms: Array, wanted: Array, balance: Balance
     return np.asarray(total - planned)
 
 
-def _effect_of_joints(simulation: SimulationModel, data: Any, origin: Array, thrust: Array, *, stands: bool) -> Array:
+def effect_of_joints(simulation: SimulationModel, data: Any, origin: Array, thrust: Array, *, stands: bool) -> Array:
     """Return ∂w/∂s, (6, n): how joints above the base move the wrench of the thrusts, and the weight where it stands.
 
     With thrust f at p: ∂f = ω × f, and the moment (p − o) × f changes with all three; o is the CoM in flight.

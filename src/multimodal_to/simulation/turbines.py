@@ -53,3 +53,22 @@ def throttle(jet: Jet, thrust: float, rate: float, acceleration: float) -> float
     root = 1.0 + 4.0 * model.B_UU * wanted
     found = jet.throttle_max if root < 0.0 else 2.0 * wanted / (1.0 + root**0.5)
     return float(min(max(found, jet.throttle_min), jet.throttle_max))
+
+
+def around(
+    jets: tuple[Jet, ...], plan: Reference, step: int, thrust: Array, rate: Array, change: Array
+) -> Array:
+    """Return the throttle of each jet [%] that acts on a thrust as the planned one and a change do about the plan.
+
+    Args:
+        jets: of the robot.
+        plan: with the thrusts that are planned.
+        step: row of the plan.
+        thrust: T as it is [N], (jets,).
+        rate: Ṫ as it is [N/s], (jets,).
+        change: of the throttle [%], (jets,).
+    """
+    found = np.zeros(len(jets))
+    for index, jet in enumerate(jets):
+        found[index] = min(max(float(plan.throttle[step, index] + change[index]), jet.throttle_min), jet.throttle_max)
+    return found

@@ -1,0 +1,199 @@
+"""A feedback that looks along the plan: what thrusts, contact forces and joints do about an error, now and later.
+
+Turbines are slow: half a second before a foot leaves the ground, thrusts have to be on the way to what the flight needs.
+So the gains come from a linear-quadratic problem along the whole plan, solved backwards once, when a plan is taken over.
+With the errors ξ = (x, ẋ, θ, hω, T, Ṫ) of CoM, attitude, angular momentum and thrusts, in the robot's own units,
+
+    m ẍ = Σ a_i T_i + θ × f_T + F            a_i where jet i pushes, f_T the planned sum of the thrusts
+    I θ̇ = hω
+    ḣω = Σ (r_i × a_i) T_i + θ × m_T + F_c × x + M      r_i from the CoM, m_T their moment, F_c the planned contact force
+    T̈ = ∂T̈/∂T T + ∂T̈/∂Ṫ Ṫ + ∂T̈/∂u u
+
+each input has a spread, which is what it may do without much cost: the throttle u; forces at the contact points, as far
+as the plan loads them, whose sum is F and M; and the joints between base and jets, which turn and shift the thrusts as
+far as the feet do not carry. Where no jet can be turned, the base leans to move aside: θ × f_T.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from multimodal_to.adam.spatial import Array
+from multimodal_to.models.robot import Robot
+from multimodal_to.simulation.controller import Belief, row_of
+from multimodal_to.simulation.model import mujoco_module
+from multimodal_to.simulation.reference import Reference
+from multimodal_to.simulation.stabiliser import effect_of_joints, rotation_vector
+from multimodal_to.simulation.units import Units
+
+GRID = 0.02  # between two rows of the gains [s]
+SETTLING = 4.0  # how long the end is held for the gains there [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LookAhead:
+    """How large errors and inputs may be; all of them count alike when they are so large."""
+
+    place: float = 0.02  # of the CoM [L]
+    velocity: float = 0.03  # [√(g L)]
+    tilt: float = 0.05  # [rad]
+    spin: float = 0.005  # of the angular momentum [m L √(g L)]
+    throttle: float = 0.2  # of its range [1]
+    load: float = 0.5  # of a contact force, as a share of the planned load of its point [1]
+    joint: float = 0.1  # of a joint between base and jets [rad]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Feedback:
+    """Gains along a plan: what is done about ξ = (x, ẋ, θ, hω, T, Ṫ), SI units, world axes; a row for each time."""
+
+    throttle: Array  # of u [%], (steps, jets, 12 + 2 jets)
+    wrench: Array  # of force and moment of the ground about the CoM [N, N m], (steps, 6, 12 + 2 jets)
+    joints: Array  # of s [rad or m], (steps, n, 12 + 2 jets)
+    turning: Array  # I⁻¹ ∂hω/∂ṡ: how joints turn against the whole, (steps, 3, n)
+
+    @classmethod
+    def along(cls, belief: Belief, plan: Reference, period: float, how: LookAhead) -> Feedback:
+        """Return the gains along a plan.
+
+        Args:
+            belief: robot and ground; its state is lost.
+            plan: with rows a `period` apart.
+            period: [s].
+            how: how large errors and inputs may be.
+        """
+        every = max(round(GRID / period), 1)
+        rows = range(0, len(plan.com), every)
+        systems = [_System.at(belief, plan, row, how) for row in rows]
+        robot, units = belief.simulation.robot, Units.of(belief.simulation.robot)
+        jets = len(robot.jets)
+        rate, length, force = units.frequency, units.length, units.force
+        sizes = [how.place * length, how.velocity * length * rate, how.tilt, how.spin * units.moment / rate]
+        own = np.concatenate([np.repeat(sizes, 3), np.full(2 * jets, np.inf)])
+        cost = np.diag(1.0 / own**2)
+        scale = np.concatenate(
+            [np.repeat([length, length * rate, 1.0, units.moment / rate], 3), np.full(jets, force), np.full(jets, force * rate)]
+        )
+        weight = scale[:, None] * cost * scale * (GRID * rate)
+        value = weight * 10.0
+        gains = np.zeros((len(systems), systems[0].inputs.shape[1], own.size))
+        for _ in range(round(SETTLING / GRID)):
+            value, _ = _backward(systems[-1], value, weight, scale, rate)
+        for index in reversed(range(len(systems))):
+            value, gains[index] = _backward(systems[index], value, weight, scale, rate)
+        spreads = np.array([system.spreads for system in systems])
+        done = np.einsum("kij,kjl->kil", spreads, gains)
+        return cls(throttle=done[:, :jets], wrench=done[:, jets : jets + 6], joints=done[:, jets + 6 :], turning=np.array([system.turning for system in systems]))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _System:
+    """ξ̇ = A ξ + B η with inputs η of spread one, SI units; S η is what they stand for."""
+
+    errors: Array  # A
+    inputs: Array  # B
+    spreads: Array  # S, (jets + 6 + n, inputs)
+    turning: Array  # I⁻¹ ∂hω/∂ṡ, (3, n)
+
+    @classmethod
+    def at(cls, belief: Belief, plan: Reference, row: int, how: LookAhead) -> _System:
+        mujoco, simulation, data = mujoco_module(), belief.simulation, belief.data
+        robot, model = simulation.robot, simulation.model
+        jets, count = len(robot.jets), len(robot.joint_names)
+        quaternion = np.zeros(4)
+        mujoco.mju_mat2Quat(quaternion, plan.rotation[row].ravel())
+        simulation.set_state(
+            data, plan.base_position[row], quaternion[[1, 2, 3, 0]], plan.joints[row], np.zeros(6), np.zeros(count)
+        )
+        mujoco.mj_fwdPosition(model, data)
+        com = data.subtree_com[1].copy()
+        axes = -data.site_xmat[simulation.jets].reshape(-1, 3, 3)[:, :, 2]
+        arms = data.site_xpos[simulation.jets] - com
+        thrusts = axes * plan.thrust[row][:, None]
+        moments = np.cross(arms, thrusts)
+        points, forces = data.geom_xpos[simulation.points] - com, plan.contact_forces[row]
+        load = np.maximum(forces[:, 2], 0.0)
+        units = Units.of(robot)
+        free = max(0.0, 1.0 - float(load.sum()) / units.force)
+
+        own, spin = _inertia(belief, com)
+        counter = np.linalg.solve(own, spin)
+        size = 12 + 2 * jets
+        errors = np.zeros((size, size))
+        errors[0:3, 3:6] = np.eye(3)
+        errors[3:6, 6:9] = -_skew(thrusts.sum(axis=0)) / units.mass
+        errors[6:9, 9:12] = np.linalg.inv(own)
+        errors[9:12, 0:3] = _skew(forces.sum(axis=0))
+        errors[9:12, 6:9] = -_skew(moments.sum(axis=0))
+        errors[3:6, 12 : 12 + jets] = axes.T / units.mass
+        errors[9:12, 12 : 12 + jets] = np.cross(arms, axes).T
+        errors[12 : 12 + jets, 12 + jets :] = np.eye(jets)
+        spreads = np.zeros((jets + 6 + count, jets + 6 + count))
+        effect = np.zeros((size, jets + 6 + count))
+        for index, jet in enumerate(robot.jets):
+            of_thrust, of_rate, of_throttle = _slopes(jet, *(getattr(plan, name)[row, index] for name in ("thrust", "thrust_rate", "throttle")))
+            errors[12 + jets + index, 12 + index] = of_thrust
+            errors[12 + jets + index, 12 + jets + index] = of_rate
+            effect[12 + jets + index, index] = of_throttle
+            spreads[index, index] = how.throttle * (jet.throttle_max - jet.throttle_min)
+        of_point = np.hstack([np.vstack([np.eye(3), _skew(point)]) for point in points]) if len(points) else np.zeros((6, 0))
+        spread = (how.load * load[:, None] * np.array([belief.friction, belief.friction, 1.0])).ravel()
+        spreads[jets : jets + 6, jets : jets + 6] = _root((of_point * spread**2) @ of_point.T)
+        effect[3:6, jets : jets + 3] = np.eye(3) / units.mass
+        effect[9:12, jets + 3 : jets + 6] = np.eye(3)
+        if jets and free > 0.0:
+            of_joints = effect_of_joints(simulation, data, com, plan.thrust[row], stands=False)
+            turning = -np.vstack([_skew(thrusts.sum(axis=0)), _skew(moments.sum(axis=0))])
+            of_joints = of_joints - (turning @ counter) * of_joints.any(axis=0)
+            effect[3:6, jets + 6 :], effect[9:12, jets + 6 :] = of_joints[:3] / units.mass, of_joints[3:]
+            spreads[jets + 6 :, jets + 6 :] = how.joint * free * np.eye(count)
+        return cls(errors=errors, inputs=effect @ spreads, spreads=spreads, turning=counter)
+
+
+def _backward(system: _System, value: Array, weight: Array, scale: Array, rate: float) -> tuple[Array, Array]:
+    """Return the cost-to-go a step of the grid before, in scaled errors, and the gains there, of errors in SI units."""
+    size = len(scale)
+    errors = system.errors * scale / scale[:, None] * GRID
+    inputs = system.inputs / scale[:, None] * GRID
+    step = np.eye(size) + errors + errors @ errors / 2.0
+    moved = inputs + errors @ inputs / 2.0
+    cost = np.eye(inputs.shape[1]) * (GRID * rate)
+    gain = -np.linalg.solve(cost + moved.T @ value @ moved, moved.T @ value @ step)
+    closed = step + moved @ gain
+    value = weight + gain.T @ cost @ gain + closed.T @ value @ closed
+    return (value + value.T) / 2.0, gain / scale
+
+
+def _inertia(belief: Belief, com: Array) -> tuple[Array, Array]:
+    """Return the robot's inertia about its CoM as it stands [kg m²], and ∂hω/∂ṡ; world axes, (3, 3) and (3, n)."""
+    mujoco, model, data = mujoco_module(), belief.simulation.model, belief.data
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    arm, turn = _skew(com - data.xpos[1]), belief.rotation
+    inertia = turn @ mass[3:6, 3:6] @ turn.T + belief.simulation.robot.mass * arm @ arm
+    return inertia, (turn @ mass[3:6] - arm @ mass[:3]) @ belief.simulation.coupling
+
+
+def _slopes(jet: Any, thrust: float, rate: float, throttle: float) -> tuple[float, float, float]:
+    """Return ∂T̈/∂T, ∂T̈/∂Ṫ and ∂T̈/∂u."""
+    model = jet.model
+    effective = throttle + model.B_UU * throttle**2
+    gain = model.B_U + model.B_T * thrust + model.B_D * rate
+    return (
+        model.K_T + 2 * model.K_TT * thrust + model.K_TD * rate + model.B_T * effective,
+        model.K_D + 2 * model.K_DD * rate + model.K_TD * thrust + model.B_D * effective,
+        gain * (1 + 2 * model.B_UU * throttle),
+    )
+
+
+def _root(matrix: Array) -> Array:
+    values, vectors = np.linalg.eigh(matrix)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
+
+def _skew(vector: Array) -> Array:
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
