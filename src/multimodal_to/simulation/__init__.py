@@ -7,21 +7,34 @@ from multimodal_to.simulation.flight import Flight
 from multimodal_to.simulation.model import SimulationModel, build_model
 from multimodal_to.simulation.playback import Playback, play
 from multimodal_to.simulation.report import JointTorque, Switch, Tracking, simulated_trajectory, tracking
+from multimodal_to.simulation.servos import ServoController, ServoGains
+from multimodal_to.simulation.trials import Draws, Trial, run_trial, run_trials
 
 __all__ = [
+    "Command",
+    "Controller",
+    "Disturbance",
+    "Draws",
     "Flight",
     "JointTorque",
     "Playback",
     "Push",
+    "ServoController",
+    "ServoGains",
+    "Servos",
     "SimulationModel",
     "Switch",
     "Tracking",
+    "Trial",
     "build_model",
     "by_mujoco",
     "by_rnea",
     "disagreement",
+    "draw",
     "play",
     "random_states",
+    "run_trial",
+    "run_trials",
     "simulated_trajectory",
     "states_along",
     "tracking",
