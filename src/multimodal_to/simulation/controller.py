@@ -6,7 +6,7 @@ simulation: neither which masses the simulated robot has, nor where it touches, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -107,6 +107,20 @@ class Belief:
         self._mujoco.mj_fwdVelocity(model, data)
         self._mujoco.mj_subtreeVel(model, data)
 
+    def put_plan(self, plan: Reference, step: int) -> None:
+        """Take base and joints of a row of a plan over, at rest; nothing else is computed."""
+        quaternion = np.zeros(4)
+        self._mujoco.mju_mat2Quat(quaternion, plan.rotation[step].ravel())
+        rest = np.zeros(plan.joints.shape[1])
+        place = plan.base_position[step], quaternion[[1, 2, 3, 0]], plan.joints[step]
+        self.simulation.set_state(self.data, *place, np.zeros(6), rest)
+
+    def mass_matrix(self) -> Array:
+        """Return M in (ṗ, ω in the base's axes, ṡ), (6 + n, 6 + n)."""
+        full = np.zeros((self.simulation.model.nv,) * 2)
+        self._mujoco.mj_fullM(self.simulation.model, self.data, full)
+        return np.asarray(self._of_joints.T @ full @ self._of_joints)
+
 
 Gains = TypeVar("Gains")
 
@@ -115,15 +129,15 @@ def drawn(gains: Gains, rng: np.random.Generator, spread: float) -> Gains:
     """Return gains whose numbers are each drawn within ± `spread` of what they were, as a share.
 
     Args:
-        gains: a dataclass of numbers.
+        gains: a dataclass of numbers, and of other such dataclasses.
         rng: that draws.
         spread: as a share [1].
     """
-    factors = rng.uniform(1.0 - spread, 1.0 + spread, len(fields(gains)))  # type: ignore[arg-type]
-    changes = {
-        entry.name: getattr(gains, entry.name) * float(factor)
-        for entry, factor in zip(fields(gains), factors, strict=True)  # type: ignore[arg-type]
-    }
+    changes: dict[str, Any] = {}
+    for entry in fields(gains):  # type: ignore[arg-type]
+        value = getattr(gains, entry.name)
+        other = is_dataclass(value)
+        changes[entry.name] = drawn(value, rng, spread) if other else value * float(rng.uniform(1 - spread, 1 + spread))
     return replace(gains, **changes)  # type: ignore[type-var]
 
 

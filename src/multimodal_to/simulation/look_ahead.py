@@ -23,35 +23,39 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
-from multimodal_to.simulation.controller import Belief, row_of
+from multimodal_to.models.state import State
+from multimodal_to.simulation.controller import Belief
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference
-from multimodal_to.simulation.stabiliser import effect_of_joints, rotation_vector
+from multimodal_to.simulation.stabiliser import rotation_vector, skew
 from multimodal_to.simulation.units import Units
 
 GRID = 0.02  # between two rows of the gains [s]
 SETTLING = 4.0  # how long the end is held for the gains there [s]
+TURBINE = 0.5  # how long a turbine takes, roughly [s]
+FLYING = 0.1  # joints help only while the feet carry less than this [m g]
+JOINT_MAX = 0.3  # how far a joint leaves the plan [rad or m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class LookAhead:
     """How large errors and inputs may be; all of them count alike when they are so large."""
 
-    place: float = 0.02  # of the CoM [L]
-    velocity: float = 0.03  # [√(g L)]
-    tilt: float = 0.05  # [rad]
-    spin: float = 0.005  # of the angular momentum [m L √(g L)]
-    throttle: float = 0.2  # of its range [1]
+    place: float = 0.05  # of the CoM [L]
+    velocity: float = 0.1  # [√(g L)]
+    tilt: float = 0.1  # [rad]
+    spin: float = 0.02  # of the angular momentum [m L √(g L)]
+    throttle: float = 0.5  # of its range [1]
     load: float = 0.5  # of a contact force, as a share of the planned load of its point [1]
-    joint: float = 0.1  # of a joint between base and jets [rad]
+    joint: float = 0.05  # of a joint between base and jets [rad]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Feedback:
     """Gains along a plan: what is done about ξ = (x, ẋ, θ, hω, T, Ṫ), SI units, world axes; a row for each time."""
 
+    every: int  # so many rows of the plan have the same gains
     throttle: Array  # of u [%], (steps, jets, 12 + 2 jets)
-    wrench: Array  # of force and moment of the ground about the CoM [N, N m], (steps, 6, 12 + 2 jets)
     joints: Array  # of s [rad or m], (steps, n, 12 + 2 jets)
     turning: Array  # I⁻¹ ∂hω/∂ṡ: how joints turn against the whole, (steps, 3, n)
 
@@ -67,7 +71,7 @@ class Feedback:
         """
         every = max(round(GRID / period), 1)
         rows = range(0, len(plan.com), every)
-        systems = [_System.at(belief, plan, row, how) for row in rows]
+        systems = [_System.at(belief, plan, row, round(TURBINE / period), how) for row in rows]
         robot, units = belief.simulation.robot, Units.of(belief.simulation.robot)
         jets = len(robot.jets)
         rate, length, force = units.frequency, units.length, units.force
@@ -86,7 +90,51 @@ class Feedback:
             value, gains[index] = _backward(systems[index], value, weight, scale, rate)
         spreads = np.array([system.spreads for system in systems])
         done = np.einsum("kij,kjl->kil", spreads, gains)
-        return cls(throttle=done[:, :jets], wrench=done[:, jets : jets + 6], joints=done[:, jets + 6 :], turning=np.array([system.turning for system in systems]))
+        return cls(
+            every=every,
+            throttle=done[:, :jets],
+            joints=done[:, jets + 6 :],
+            turning=np.array([system.turning for system in systems]),
+        )
+
+    def errors(self, belief: Belief, plan: Reference, step: int, state: State) -> Array:
+        """Return ξ, SI units, (12 + 2 jets,).
+
+        The attitude is that of the whole robot, whose angular velocity is I⁻¹ hω: the base's, and what the joints have
+        turned against it.
+
+        Args:
+            belief: robot and ground in the state.
+            plan: whose gains these are.
+            step: row of the plan.
+            state: as it was measured.
+        """
+        data = belief.data
+        joints = self.turning[self._row(step)] @ (state.joint_positions - plan.joints[step])
+        return np.concatenate(
+            [
+                data.subtree_com[1] - plan.com[step],
+                data.subtree_linvel[1] - plan.com_velocity[step],
+                rotation_vector(belief.rotation @ plan.rotation[step].T) + joints,
+                data.subtree_angmom[1] - plan.angular_momentum[step],
+                state.thrust - plan.thrust[step],
+                state.thrust_rate - plan.thrust_rate[step],
+            ]
+        )
+
+    def answer(self, step: int, errors: Array) -> tuple[Array, Array]:
+        """Return what is added to the throttles [%], (jets,), and to the joints [rad or m], (n,).
+
+        Args:
+            step: row of the plan.
+            errors: ξ.
+        """
+        row = self._row(step)
+        joints = np.clip(self.joints[row] @ errors, -JOINT_MAX, JOINT_MAX)
+        return self.throttle[row] @ errors, joints
+
+    def _row(self, step: int) -> int:
+        return min(round(step / self.every), len(self.throttle) - 1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,16 +147,12 @@ class _System:
     turning: Array  # I⁻¹ ∂hω/∂ṡ, (3, n)
 
     @classmethod
-    def at(cls, belief: Belief, plan: Reference, row: int, how: LookAhead) -> _System:
-        mujoco, simulation, data = mujoco_module(), belief.simulation, belief.data
-        robot, model = simulation.robot, simulation.model
+    def at(cls, belief: Belief, plan: Reference, row: int, every: int, how: LookAhead) -> _System:
+        simulation, data = belief.simulation, belief.data
+        robot = simulation.robot
         jets, count = len(robot.jets), len(robot.joint_names)
-        quaternion = np.zeros(4)
-        mujoco.mju_mat2Quat(quaternion, plan.rotation[row].ravel())
-        simulation.set_state(
-            data, plan.base_position[row], quaternion[[1, 2, 3, 0]], plan.joints[row], np.zeros(6), np.zeros(count)
-        )
-        mujoco.mj_fwdPosition(model, data)
+        belief.put_plan(plan, row)
+        mujoco_module().mj_fwdPosition(simulation.model, data)
         com = data.subtree_com[1].copy()
         axes = -data.site_xmat[simulation.jets].reshape(-1, 3, 3)[:, :, 2]
         arms = data.site_xpos[simulation.jets] - com
@@ -117,17 +161,18 @@ class _System:
         points, forces = data.geom_xpos[simulation.points] - com, plan.contact_forces[row]
         load = np.maximum(forces[:, 2], 0.0)
         units = Units.of(robot)
-        free = max(0.0, 1.0 - float(load.sum()) / units.force)
+        soon = plan.contact_forces[row : row + every, :, 2].sum(axis=1).min(initial=units.force)
+        free = float(np.clip(1.0 - soon / units.force, 0.0, 1.0))
 
         own, spin = _inertia(belief, com)
         counter = np.linalg.solve(own, spin)
         size = 12 + 2 * jets
         errors = np.zeros((size, size))
         errors[0:3, 3:6] = np.eye(3)
-        errors[3:6, 6:9] = -_skew(thrusts.sum(axis=0)) / units.mass
+        errors[3:6, 6:9] = -skew(thrusts.sum(axis=0)) / units.mass
         errors[6:9, 9:12] = np.linalg.inv(own)
-        errors[9:12, 0:3] = _skew(forces.sum(axis=0))
-        errors[9:12, 6:9] = -_skew(moments.sum(axis=0))
+        errors[9:12, 0:3] = skew(forces.sum(axis=0))
+        errors[9:12, 6:9] = -skew(moments.sum(axis=0))
         errors[3:6, 12 : 12 + jets] = axes.T / units.mass
         errors[9:12, 12 : 12 + jets] = np.cross(arms, axes).T
         errors[12 : 12 + jets, 12 + jets :] = np.eye(jets)
@@ -138,18 +183,19 @@ class _System:
             errors[12 + jets + index, 12 + index] = of_thrust
             errors[12 + jets + index, 12 + jets + index] = of_rate
             effect[12 + jets + index, index] = of_throttle
-            spreads[index, index] = how.throttle * (jet.throttle_max - jet.throttle_min)
-        of_point = np.hstack([np.vstack([np.eye(3), _skew(point)]) for point in points]) if len(points) else np.zeros((6, 0))
+            spreads[index, index] = how.throttle * max(free, 1e-3) * (jet.throttle_max - jet.throttle_min)
+        of_point = np.hstack([np.vstack([np.eye(3), skew(point)]) for point in points]) if len(points) else np.zeros((6, 0))
         spread = (how.load * load[:, None] * np.array([belief.friction, belief.friction, 1.0])).ravel()
         spreads[jets : jets + 6, jets : jets + 6] = _root((of_point * spread**2) @ of_point.T)
         effect[3:6, jets : jets + 3] = np.eye(3) / units.mass
         effect[9:12, jets + 3 : jets + 6] = np.eye(3)
-        if jets and free > 0.0:
-            of_joints = effect_of_joints(simulation, data, com, plan.thrust[row], stands=False)
-            turning = -np.vstack([_skew(thrusts.sum(axis=0)), _skew(moments.sum(axis=0))])
+        flying = max(0.0, 1.0 - load.sum() / (FLYING * units.force))
+        if jets and flying > 0.0:
+            of_joints = _effect_of_joints(belief, com, plan.thrust[row])
+            turning = -np.vstack([skew(thrusts.sum(axis=0)), skew(moments.sum(axis=0))])
             of_joints = of_joints - (turning @ counter) * of_joints.any(axis=0)
             effect[3:6, jets + 6 :], effect[9:12, jets + 6 :] = of_joints[:3] / units.mass, of_joints[3:]
-            spreads[jets + 6 :, jets + 6 :] = how.joint * free * np.eye(count)
+            spreads[jets + 6 :, jets + 6 :] = how.joint * flying * np.eye(count)
         return cls(errors=errors, inputs=effect @ spreads, spreads=spreads, turning=counter)
 
 
@@ -169,12 +215,35 @@ def _backward(system: _System, value: Array, weight: Array, scale: Array, rate: 
 
 def _inertia(belief: Belief, com: Array) -> tuple[Array, Array]:
     """Return the robot's inertia about its CoM as it stands [kg m²], and ∂hω/∂ṡ; world axes, (3, 3) and (3, n)."""
-    mujoco, model, data = mujoco_module(), belief.simulation.model, belief.data
-    mass = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, mass)
-    arm, turn = _skew(com - data.xpos[1]), belief.rotation
+    mass, arm, turn = belief.mass_matrix(), skew(com - belief.data.xpos[1]), belief.rotation
     inertia = turn @ mass[3:6, 3:6] @ turn.T + belief.simulation.robot.mass * arm @ arm
-    return inertia, (turn @ mass[3:6] - arm @ mass[:3]) @ belief.simulation.coupling
+    return inertia, turn @ mass[3:6, 6:] - arm @ mass[:3, 6:]
+
+
+def _effect_of_joints(belief: Belief, com: Array, thrust: Array) -> Array:
+    """Return ∂w/∂s, (6, n): how joints move the wrench of the thrusts about the CoM while the base stays as it is.
+
+    With a thrust f at p: ∂f = ω × f, and the moment (p − x) × f changes with all three. Joints that turn no jet have no
+    effect here.
+
+    Args:
+        belief: robot and ground in the planned state.
+        com: x [m], (3,).
+        thrust: of each jet [N], (jets,).
+    """
+    mujoco, simulation, data = mujoco_module(), belief.simulation, belief.data
+    model = simulation.model
+    linear, angular, of_com = (np.zeros((3, model.nv)) for _ in range(3))
+    mujoco.mj_jacSubtreeCom(model, data, of_com, 1)
+    effect, moves = np.zeros((6, model.nv)), np.zeros(model.nv, dtype=bool)
+    axes = -data.site_xmat[simulation.jets].reshape(-1, 3, 3)[:, :, 2]
+    for site, force in zip(simulation.jets, axes * thrust[:, None], strict=True):
+        mujoco.mj_jacSite(model, data, linear, angular, site)
+        turned = -skew(force) @ angular
+        effect[:3] += turned
+        effect[3:] += skew(data.site_xpos[site] - com) @ turned - skew(force) @ (linear - of_com)
+        moves |= angular.any(axis=0)
+    return np.asarray((effect * moves) @ simulation.coupling)
 
 
 def _slopes(jet: Any, thrust: float, rate: float, throttle: float) -> tuple[float, float, float]:
@@ -192,8 +261,3 @@ def _slopes(jet: Any, thrust: float, rate: float, throttle: float) -> tuple[floa
 def _root(matrix: Array) -> Array:
     values, vectors = np.linalg.eigh(matrix)
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
-
-
-def _skew(vector: Array) -> Array:
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,10 +10,11 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.simulation.controller import Belief, Command, Servos, row_of
+from multimodal_to.simulation.look_ahead import Feedback, LookAhead
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
-from multimodal_to.simulation.stabiliser import Balance, BalanceGains, Correction, Turbines, correct
-from multimodal_to.simulation.turbines import throttles
+from multimodal_to.simulation.stabiliser import Balance, BalanceGains, contact_forces
+from multimodal_to.simulation.turbines import around
 from multimodal_to.simulation.units import Units
 from multimodal_to.trajectory import Trajectory
 
@@ -27,6 +28,7 @@ class ServoGains(BalanceGains):
 
     stiffness: float = 1.2  # K of each joint's servo [m g L/rad]
     damping: float = 0.16  # D of each joint's servo [m g L √(L/g)/rad]
+    look_ahead: LookAhead = field(default_factory=LookAhead)
 
 
 class ServoController:
@@ -46,7 +48,7 @@ class ServoController:
         self._shift: Array
         self._servo: tuple[Array, Array]
         self._balance: Balance
-        self._throttle: Array
+        self._feedback: Feedback
 
     @property
     def period(self) -> float:
@@ -67,13 +69,14 @@ class ServoController:
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
         units, gains = Units.of(robot), self._gains
         self._balance = Balance(gains=gains, units=units, inertia=inertia(robot), friction=self._belief.friction)
+        self._feedback = Feedback.along(self._belief, self._plan, PERIOD, gains.look_ahead)
         count = len(robot.joint_names)
         self._servo = (
             np.full(count, gains.stiffness * units.moment),
             np.full(count, gains.damping * units.moment / units.frequency),
         )
         if first:
-            self._shift, self._throttle = np.zeros(count), plan.throttle[:, 0].copy()
+            self._shift = np.zeros(count)
 
     def command(self, state: State, time: float) -> Command:
         """Return what the robot shall do.
@@ -85,13 +88,12 @@ class ServoController:
         assert self._belief is not None
         self._belief.put(state)
         plan, step = self._plan, row_of(time - self._since, PERIOD, self._plan)
-        correction, torques, throttle = Correction.none(self._robot), plan.torques[step], plan.throttle[step]
+        torques, throttle = plan.torques[step], plan.throttle[step]
         if self._stabilise:
-            correction = self._correction(state, step)
-            torques = torques - self._borne_by_joints(state, step, correction)
-            throttle = throttles(self._robot.jets, plan, step, state.thrust, state.thrust_rate, correction.thrust)
-        self._throttle = throttle
-        self._shift = self._shift + (correction.joints - self._shift) * PERIOD / JOINT_LAG
+            change, joints = self._feedback.answer(step, self._feedback.errors(self._belief, plan, step, state))
+            throttle = around(self._robot.jets, plan, step, change)
+            self._shift = self._shift + (joints - self._shift) * PERIOD / JOINT_LAG
+            torques = torques - self._borne_by_joints(state, step)
         servos = Servos(
             positions=plan.joints[step] + self._shift,
             velocities=plan.joint_velocities[step],
@@ -100,23 +102,12 @@ class ServoController:
         )
         return Command(torques=torques, throttle=throttle, servos=servos)
 
-    def _correction(self, state: State, step: int) -> Correction:
-        """Let the stabiliser look at the state."""
-        assert self._belief is not None
-        turbines = Turbines(
-            thrust=state.thrust,
-            at_most=self._throttle >= np.array([jet.throttle_max for jet in self._robot.jets]),
-            at_least=self._throttle <= np.array([jet.throttle_min for jet in self._robot.jets]),
-        )
-        return correct(self._belief.simulation, self._belief.data, self._plan, step, turbines, self._balance)
-
-    def _borne_by_joints(self, state: State, step: int, correction: Correction) -> Array:
+    def _borne_by_joints(self, state: State, step: int) -> Array:
         """Return Jᵀ f of the thrusts' difference from the plan and of the forces that are asked of the ground.
 
         Args:
             state: with the thrusts as they are.
             step: row of the plan.
-            correction: with the forces that are asked.
         """
         assert self._belief is not None
         mujoco, data, simulation = mujoco_module(), self._belief.data, self._belief.simulation
@@ -125,7 +116,8 @@ class ServoController:
             mujoco.mj_jacSite(simulation.model, data, jacobian, None, site)
             axis = -data.site_xmat[site].reshape(3, 3)[:, 2]
             total += jacobian.T @ axis * (state.thrust[index] - self._plan.thrust[step, index])
-        for index, force in enumerate(correction.contact_forces):
+        forces = contact_forces(simulation, data, self._plan, step, state.thrust, self._balance)
+        for index, force in enumerate(forces):
             if force.any():
                 mujoco.mj_jacGeom(simulation.model, data, jacobian, None, simulation.points[index])
                 total += jacobian.T @ force

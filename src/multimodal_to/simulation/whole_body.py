@@ -2,85 +2,91 @@
 
 With ν̇ the accelerations of base and joints, f the forces at the contact points and T the thrusts as they are,
 
-    min Σ_i w_i ‖A_i ν̇ − a_i‖² + w_f ‖f − f*‖²   subject to   the base's rows of M ν̇ + h = Jᵀ f + J_Tᵀ T,
-    f within the friction cones, and the joints' rows, which are the torques, within the effort limits.
+    min Σ_i w_i ‖A_i ν̇ − a_i‖² + w_f ‖f − f*‖²   subject to   M ν̇ + h = Jᵀ f + J_Tᵀ T + τ,
 
-The tasks i are the momentum's rate, the base's attitude, the feet and the posture; each a_i is that of the plan and a
-feedback. Forces are allowed at all points of a foot that the plan loads and that is near the ground, and not only where
-it touches: else a foot that comes down on its heel stays there.
+with f within the friction cones and the torques τ, which act on the joints alone, within the effort limits. The tasks i
+are the momentum's rate, the base's attitude, the feet and the posture; each a_i is that of the plan and a feedback.
+
+Forces are allowed at all points of a foot that the plan loads and that is near the ground, and not only where it
+touches: else a foot that comes down on its heel stays there. Throttles come from `look_ahead`, and with them what the
+joints between base and jets add to their posture.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import ModuleType
-from typing import Any
 
+import casadi as cs
 import numpy as np
+from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
-from multimodal_to.models.terrain import FlatGround, Surface, frame_function
+from multimodal_to.models.terrain import FlatGround, frame_function
 from multimodal_to.scenarios.data import stored
 from multimodal_to.simulation.controller import Belief, Command, Servos, row_of
-from multimodal_to.simulation.look_ahead import GRID, Feedback, LookAhead
+from multimodal_to.simulation.feet import PlannedFeet
+from multimodal_to.simulation.look_ahead import Feedback, LookAhead
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
-from multimodal_to.simulation.servos import inertia
-from multimodal_to.simulation.stabiliser import (
-    Balance,
-    BalanceGains,
-    Correction,
-    Turbines,
-    correct,
-    rotation_vector,
-)
+from multimodal_to.simulation.stabiliser import rotation_vector, skew
 from multimodal_to.simulation.turbines import around
 from multimodal_to.simulation.units import Units
 from multimodal_to.trajectory import Trajectory
-from multimodal_to.trajectory.derived import loaded_force
 
 PERIOD = 2e-3  # between two commands [s]
+NEAR = 3.5e-3
+"""A foot that the plan loads may push while it is nearer to the ground than this [L]: 2 mm of the iRonCub."""
+STUCK = 0.02  # how long a foot counts as near after it was so [s]
+SOON = 0.25  # how long before it is loaded a foot that is near counts as standing [s]
+LOADED = 0.01  # a foot with more planned load than this stands [m g]
+DOWN = 0.0126  # how fast a foot goes on down that should stand already [√(g L)]
+SIDES = 8  # of the pyramid within a friction cone
+FRICTION_SHARE = 0.97  # of the friction coefficient that is used [1]
+ACCURACY, ITERATIONS = 1e-5, 60  # of the program's solution, in the robot's own units [1]
+JOINT_LAG = 0.03  # with which joints take over the wish of the look-ahead [s]
 
 
 @dataclass(frozen=True, kw_only=True)
-class WholeBodyGains(BalanceGains):
-    """The numbers of the whole-body controller, in the robot's own units: m, g and L, the height of its CoM at home."""
+class WholeBodyGains:
+    """The feedback of the whole-body controller, in the robot's own units: m, g and L, its CoM's height at home."""
 
-    com: float = 1.2  # level CoM [g/L]
-    com_rate: float = 2.2  # [√(g/L)]
+    com: float = 0.95  # level CoM [g/L]
+    com_rate: float = 1.95  # [√(g/L)]
     height: float = 3.5  # CoM along gravity [g/L]
     height_rate: float = 3.7  # [√(g/L)]
-    spin_rate: float = 2.0  # angular momentum [√(g/L)]
-    base: float = 4.7  # attitude of the base [g/L]
-    base_rate: float = 4.4  # [√(g/L)]
+    spin_rate: float = 1.2  # angular momentum [√(g/L)]
+    base: float = 1.15  # attitude of the base [g/L]
+    base_rate: float = 1.87  # [√(g/L)]
     foot: float = 17.6  # of a foot that swings [g/L]
     foot_rate: float = 8.5  # [√(g/L)]
-    stance_rate: float = 9.7  # of a foot that stands [√(g/L)]
-    joint: float = 53.0  # [g/L]
+    stance_rate: float = 3.7  # of a foot that stands [√(g/L)]
+    joint: float = 53.0  # posture [g/L]
     joint_rate: float = 14.6  # [√(g/L)]
-    stiffness: float = 1.2  # K of each joint's servo [m g L/rad]
-    damping: float = 0.16  # D of each joint's servo [m g L √(L/g)/rad]
+    stiffness: float = 0.35  # K of each joint's servo [m g L/rad]
+    damping: float = 0.052  # D of each joint's servo [m g L √(L/g)/rad]
+    look_ahead: LookAhead = field(default_factory=LookAhead)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Weights:
-    """How much each task counts, for an error of the robot's own units: g for accelerations, g/L for turning ones."""
+    """How much the square of an error of the robot's own units counts: g, g/L, m g or m g L."""
 
-    com: float = 1.0
-    spin: float = 33.0  # of the angular momentum's rate [m g L]
-    base: float = 6.0
+    com: float = 7.1
+    spin: float = 26.0  # of the angular momentum's rate
+    base: float = 4.5
     base_in_flight: float = 0.006
-    stance: float = 30.0
-    foot: float = 2.0
-    legs: float = 0.09
-    others: float = 0.3
-    flying: float = 0.9  # joints in flight
-    force: float = 0.2  # of contact forces away from the plan's [m g]
-    torque: float = 0.004  # [m g L]
+    stance: float = 147.0  # of feet that stand
+    foot: float = 4.3  # of feet that swing
+    foot_soon: float = 0.1  # in flight, of a foot that comes down soon
+    legs: float = 0.0013  # posture of the joints that carry feet, while one stands
+    others: float = 0.75  # posture of the other joints
+    flying: float = 0.9  # posture in flight
+    force: float = 0.31  # of contact forces away from the plan's
+    torque: float = 0.004
 
 
 def solver_module() -> ModuleType:
@@ -97,38 +103,46 @@ def solver_module() -> ModuleType:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Feet:
-    """The feet of a plan at its rows: where the middles of their contact points are, and how they turn and move."""
+class _Task:
+    """w ‖A ν̇ − a‖², a weight for each row."""
 
-    middle: Array  # [m], (feet, steps, 3)
-    rotation: Array  # of the link, (feet, steps, 3, 3)
-    velocity: Array  # of middle and link [m/s, rad/s], (feet, steps, 6)
-    acceleration: Array  # [m/s², rad/s²], (feet, steps, 6)
-    load: Array  # normal force that is planned [N], (feet, steps)
+    matrix: Array  # A, (rows, 6 + n)
+    wanted: Array  # a, (rows,)
+    weight: Array  # w, (rows,)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Contacts:
+    """The points that may push."""
+
+    points: list[int]  # of the robot's contact points
+    jacobian: Array  # (3 points, 6 + n)
+    cones: Array  # rows of what is at most zero, (rows, 3 points)
 
 
 class WholeBodyController:
-    """A quadratic program for accelerations and contact forces, on top of joint servos.
+    """A quadratic program for accelerations and contact forces, on top of soft joint servos.
 
     Args:
         gains: its feedback.
         weights: how much each task counts.
     """
 
-    near = 0.0035  # a planned foot may push while its lowest point is nearer to the ground than this [L]; 2 mm
-    mode = "plan"
-    leak = 5.0
-    sides = 8
-    early = 0.25
-    how = LookAhead()
-    total = False
-    ff = "force"
-    ideal = True
-
     def __init__(self, gains: WholeBodyGains | None = None, weights: Weights | None = None) -> None:
         self._gains, self._weights = gains or WholeBodyGains(), weights or Weights()
         self._since = 0.0
-        self._belief: Belief | None = None
+        self._robot: Robot | None = None
+        self._belief: Belief
+        self._plan: Reference
+        self._feet: PlannedFeet
+        self._feedback: Feedback
+        self._units: Units
+        self._ground: cs.Function | None
+        self._legs: NDArray[np.bool_]
+        self._servo: tuple[Array, Array]
+        self._shift: Array
+        self._near: Array
+        self._torques: Array
 
     @property
     def period(self) -> float:
@@ -136,76 +150,40 @@ class WholeBodyController:
         return PERIOD
 
     def reset(self, robot: Robot, plan: Trajectory, since: float) -> None:
-        """Follow a plan from now on.
+        """Follow a plan from now on; what the joints have been shifted by stays.
 
         Args:
             robot: that moves.
             plan: its motion.
             since: when the plan's first knot is or was, since the simulation's start [s].
         """
-        first = self._belief is None
-        self._robot, self._since, self._units = robot, since, Units.of(robot)
-        self._belief = Belief(robot, plan)
-        self._simulation, self._data = self._belief.simulation, self._belief.data
-        self._model = self._simulation.model
-        scenario = stored(plan)
-        self._surface = FlatGround() if scenario is None else scenario.surface
+        first, self._robot, self._since = self._robot is None, robot, since
+        self._units, self._belief = Units.of(robot), Belief(robot, plan)
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
-        self._members = [np.array(members) for members in robot.feet.values()]
-        self._bodies = [int(self._model.geom_bodyid[self._simulation.points[own[0]]]) for own in self._members]
-        self._feet = self._planned_feet()
-        self._limits = np.where(np.isfinite(robot.joint_limits.effort), robot.joint_limits.effort, np.inf)
-        self._balance = Balance(
-            gains=self._gains, units=self._units, inertia=inertia(robot), friction=self._belief.friction
+        self._feet = PlannedFeet.along(self._belief, self._plan, PERIOD)
+        self._feedback = Feedback.along(self._belief, self._plan, PERIOD, self._gains.look_ahead)
+        scenario = stored(plan)
+        surface = FlatGround() if scenario is None else scenario.surface
+        self._ground = frame_function(surface).map(len(robot.contacts)) if robot.contacts else None
+        self._legs = self._joints_of_feet()
+        count, units = len(robot.joint_names), self._units
+        self._servo = (
+            np.full(count, self._gains.stiffness * units.moment),
+            np.full(count, self._gains.damping * units.moment / units.frequency),
         )
-        self._fb = Feedback.along(self._belief, self._plan, PERIOD, self.how)
-        count = len(robot.joint_names)
-        legs = np.zeros(count, dtype=bool)
-        jp, jr = np.zeros((3, self._model.nv)), np.zeros((3, self._model.nv))
-        for body in self._bodies:
-            mujoco_module().mj_jac(self._model, self._data, jp, jr, np.ones(3), body)
-            legs |= ((np.abs(jp).sum(0) + np.abs(jr).sum(0)) @ np.abs(self._simulation.coupling)) > 1e-9
-        self._legs = legs
-        u = self._units
-        self._K = np.full(count, self._gains.stiffness * u.moment)
-        self._D = np.full(count, self._gains.damping * u.moment / u.frequency)
-        mu = 0.97 * self._belief.friction
-        k = (np.arange(self.sides) + 0.5) * 2 * np.pi / self.sides
-        self._cone = np.column_stack([np.cos(k), np.sin(k), np.full(self.sides, -mu * np.cos(np.pi / self.sides))])
         if first:
-            self._shift, self._throttle = np.zeros(count), plan.throttle[:, 0].copy()
-            self._touched = np.full(len(self._members), -1.0)
-            self._own: tuple[Array, Array] | None = None
-            self._last = None
-            self.failures = 0
-            self.solve_time = 0.0
+            self._shift, self._torques = np.zeros(count), np.zeros(count)
+            self._near = np.full(len(robot.feet), -np.inf)  # when each foot was near the ground last [s]
 
-    def _planned_feet(self) -> _Feet:
-        mujoco, data, plan, sim = mujoco_module(), self._data, self._plan, self._simulation
-        steps, feet = len(plan.com), len(self._members)
-        middle, rotation = np.zeros((feet, steps, 3)), np.zeros((feet, steps, 3, 3))
-        self._contact_arms = np.zeros((steps, len(sim.points), 3))
-        quaternion = np.zeros(4)
-        for i in range(steps):
-            mujoco.mju_mat2Quat(quaternion, plan.rotation[i].ravel())
-            sim.set_state(
-                data, plan.base_position[i], quaternion[[1, 2, 3, 0]], plan.joints[i], np.zeros(6), np.zeros(plan.joints.shape[1])
-            )
-            mujoco.mj_kinematics(self._model, data)
-            self._contact_arms[i] = data.geom_xpos[sim.points] - plan.com[i]
-            for j, own in enumerate(self._members):
-                middle[j, i] = data.geom_xpos[sim.points[own]].mean(axis=0)
-                rotation[j, i] = data.xmat[self._bodies[j]].reshape(3, 3)
-        velocity = np.zeros((feet, steps, 6))
-        velocity[:, :, :3] = np.gradient(middle, PERIOD, axis=1)
-        turn = rotation[:, 1:] @ rotation[:, :-1].transpose(0, 1, 3, 2)
-        velocity[:, 1:, 3:] = np.stack(
-            [turn[..., 2, 1] - turn[..., 1, 2], turn[..., 0, 2] - turn[..., 2, 0], turn[..., 1, 0] - turn[..., 0, 1]],
-            axis=-1,
-        ) / (2 * PERIOD)
-        acceleration = np.gradient(velocity, PERIOD, axis=1)
-        load = np.array([plan.contact_forces[:, own, 2].sum(axis=1) for own in self._members])
-        return _Feet(middle=middle, rotation=rotation, velocity=velocity, acceleration=acceleration, load=load)
+    def _joints_of_feet(self) -> NDArray[np.bool_]:
+        """Return which joints are between the base and a foot, (n,)."""
+        simulation, found = self._belief.simulation, np.zeros(self._belief.of_joints.shape[1] - 6, dtype=bool)
+        self._belief.put_plan(self._plan, 0)
+        mujoco_module().mj_fwdPosition(simulation.model, self._belief.data)
+        for own, body in zip(self._feet.members, self._feet.bodies, strict=True):
+            middle = self._belief.data.geom_xpos[simulation.points[own]].mean(axis=0)
+            found |= np.abs(self._jacobian(middle, body)[:, 6:]).max(axis=0) > 1e-9
+        return found
 
     def command(self, state: State, time: float) -> Command:
         """Return what the robot shall do.
@@ -214,209 +192,279 @@ class WholeBodyController:
             state: as it was measured.
             time: since the simulation's start [s].
         """
-        assert self._belief is not None
+        assert self._robot is not None
         self._belief.put(state)
-        step = row_of(time - self._since, PERIOD, self._plan)
-        plan = self._plan
-        R, data = self._belief.rotation, self._data
-        xi = np.concatenate([
-            data.subtree_com[1] - plan.com[step], data.subtree_linvel[1] - plan.com_velocity[step],
-            rotation_vector(R @ plan.rotation[step].T) + self._fb.turning[min(round(step * PERIOD / GRID), len(self._fb.throttle) - 1)] @ (state.joint_positions - plan.joints[step]), data.subtree_angmom[1] - plan.angular_momentum[step],
-            state.thrust - plan.thrust[step], state.thrust_rate - plan.thrust_rate[step]])
-        k = min(round(step * PERIOD / GRID), len(self._fb.throttle) - 1)
-        du, dw, ds = self._fb.throttle[k] @ xi, self._fb.wrench[k] @ xi, self._fb.joints[k] @ xi
-        self._throttle = around(self._robot.jets, plan, step, state.thrust, state.thrust_rate, du)
-        self._shift = self._shift + (np.clip(ds, -0.3, 0.3) - self._shift) * PERIOD / 0.03
-        self._dw, self._xi = dw, xi
-        torques, accelerations = self._solve(state, step, time)
-        if self.mode == "torque":
-            return Command(torques=torques, throttle=self._throttle)
-        if self.mode == "plan":
-            servos = Servos(positions=plan.joints[step] + self._shift, velocities=plan.joint_velocities[step], stiffness=self._K, damping=self._D)
-        else:
-            place, speed = self._own or (state.joint_positions, state.joint_velocities)
-            keep = self.leak * PERIOD
-            speed = speed + PERIOD * accelerations + keep * (state.joint_velocities - speed)
-            place = place + PERIOD * speed + keep * (state.joint_positions - place)
-            self._own = place, speed
-            servos = Servos(positions=place, velocities=speed, stiffness=self._K, damping=self._D)
-        return Command(torques=torques, throttle=self._throttle, servos=servos)
+        plan, step = self._plan, row_of(time - self._since, PERIOD, self._plan)
+        errors = self._feedback.errors(self._belief, plan, step, state)
+        throttle, joints = self._feedback.answer(step, errors)
+        self._shift = self._shift + (joints - self._shift) * PERIOD / JOINT_LAG
+        self._torques = self._solve(state, step, time, errors)
+        servos = Servos(
+            positions=plan.joints[step] + self._shift,
+            velocities=plan.joint_velocities[step],
+            stiffness=self._servo[0],
+            damping=self._servo[1],
+        )
+        return Command(torques=self._torques, throttle=around(self._robot.jets, plan, step, throttle), servos=servos)
 
-    def _heights(self, points: Array) -> Array:
-        if isinstance(self._surface, FlatGround):
-            return points[:, 2] - self._surface.height
-        return np.array(frame_function(self._surface).map(len(points))(points.T)[0]).ravel()
+    def _solve(self, state: State, step: int, time: float, errors: Array) -> Array:
+        """Return the torques of the joints [N m or N], (n,).
 
-    def _solve(self, state: State, step: int, time: float) -> tuple[Array, Array]:
-        mujoco, model, data, plan = mujoco_module(), self._model, self._data, self._plan
-        sim, g, w, u = self._simulation, self._gains, self._weights, self._units
-        G = self._belief.of_joints
-        nv, n = model.nv, len(self._robot.joint_names)
-        N = 6 + n
-        M = np.zeros((nv, nv))
-        mujoco.mj_fullM(model, data, M)
-        M = G.T @ M @ G
-        h = G.T @ data.qfrc_bias
-        v = data.qvel
-        R, com = self._belief.rotation, data.subtree_com[1]
-        rate, mass, grav = u.frequency, u.mass, self._robot.gravity
-        jp, jr = np.zeros((3, nv)), np.zeros((3, nv))
-        Fj = np.zeros(nv)
-        for i, site in enumerate(sim.jets):
-            mujoco.mj_jacSite(model, data, jp, None, site)
-            Fj -= state.thrust[i] * (data.site_xmat[site].reshape(3, 3)[:, 2] @ jp)
-        Fj = G.T @ Fj
-        points = data.geom_xpos[sim.points]
-        low = self._heights(points)
-        near = self.near * u.length
-        A, a, W = [], [], []
-        Jc: list[Array] = []
-        active: list[int] = []
-        swings = []
-        horizon = min(step + int(self.early / PERIOD), len(plan.com) - 1)
-        feet = self._feet
-        for j, own in enumerate(self._members):
-            touch = bool((low[own] < 0.2 * near).any())
-            if touch:
-                self._touched[j] = time
-            loaded = feet.load[j, step] > 0.01 * u.force
-            soon = bool((feet.load[j, step : horizon + 1] > 0.01 * u.force).any())
-            mid = points[own].mean(axis=0)
-            body = self._bodies[j]
-            mujoco.mj_jac(model, data, jp, jr, mid, body)
-            J = np.vstack([jp, jr])
-            vf = J @ v
-            mujoco.mj_jacDot(model, data, jp, jr, mid, body)
-            Jdv = np.concatenate([jp @ v, jr @ v])
-            J = J @ G
-            tilt = rotation_vector(feet.rotation[j, step] @ data.xmat[body].reshape(3, 3).T)
-            close = low[own].min() < near or (self._touched[j] >= 0 and time - self._touched[j] < 0.02)
-            if (loaded or (soon and feet.velocity[j, step, 2] <= 0.02)) and close:
-                acc = -g.stance_rate * rate * vf
-                acc[3:5] += 0.25 * (g.stance_rate * rate) ** 2 * tilt[:2]
-                A.append(J)
-                a.append(acc - Jdv)
-                W.append(np.repeat([w.stance / u.gravity**2, w.stance / rate**4], 3))
-                for c in own:
-                    r = points[c] - mid
-                    S = np.array([[0, r[2], -r[1]], [-r[2], 0, r[0]], [r[1], -r[0], 0]])
-                    Jc.append(J[:3] + S @ J[3:])
-                    active.append(int(c))
+        Args:
+            state: as it was measured.
+            step: row of the plan.
+            time: since the simulation's start [s].
+            errors: of the momentum and what follows from it.
+        """
+        mass, bias = self._belief.mass_matrix(), self._belief.of_joints.T @ self._belief.data.qfrc_bias
+        feet, contacts = self._feet_and_contacts(step, time)
+        stands = bool(contacts.points)
+        tasks = [
+            *feet,
+            *self._momentum(mass, bias, step, errors),
+            self._attitude(step, stands),
+            self._posture(state, step, stands),
+        ]
+        return self._least(tasks, contacts, mass, bias - self._of_thrusts(state), step)
+
+    def _jacobian(self, point: Array, body: int) -> Array:
+        """Return that of a body's point and its turning, in (ṗ, ω in the base's axes, ṡ), (6, 6 + n)."""
+        model = self._belief.simulation.model
+        both = np.zeros((6, model.nv))
+        mujoco_module().mj_jac(model, self._belief.data, both[:3], both[3:], point, body)
+        return np.asarray(both @ self._belief.of_joints)
+
+    def _of_thrusts(self, state: State) -> Array:
+        """Return J_Tᵀ T, (6 + n,)."""
+        simulation, data = self._belief.simulation, self._belief.data
+        jacobian, total = np.zeros((3, simulation.model.nv)), np.zeros(simulation.model.nv)
+        for site, thrust in zip(simulation.jets, state.thrust, strict=True):
+            mujoco_module().mj_jacSite(simulation.model, data, jacobian, None, site)
+            total -= thrust * (data.site_xmat[site].reshape(3, 3)[:, 2] @ jacobian)
+        return np.asarray(total @ self._belief.of_joints)
+
+    def _feet_and_contacts(self, step: int, time: float) -> tuple[list[_Task], _Contacts]:
+        """Return the tasks of the feet and which points may push."""
+        simulation, data, feet, units = self._belief.simulation, self._belief.data, self._feet, self._units
+        standing, swinging = list[_Task](), list[tuple[Array, Array, bool]]()
+        points, jacobians, cones = list[int](), list[Array](), list[Array]()
+        if self._ground is None:
+            return [], self._contacts(points, jacobians, cones)
+        positions = data.geom_xpos[simulation.points]
+        heights, normals, tangents = (np.array(part) for part in self._ground(positions.T))
+        until = min(step + round(SOON / PERIOD), feet.load.shape[1] - 1)
+        for foot, (own, body) in enumerate(zip(feet.members, feet.bodies, strict=True)):
+            loaded = feet.load[foot, step] > LOADED * units.force
+            soon = bool((feet.load[foot, step : until + 1] > LOADED * units.force).any())
+            lowest = float(heights[0, own].min())
+            if lowest < 0.2 * NEAR * units.length:
+                self._near[foot] = time
+            close = lowest < NEAR * units.length or time - self._near[foot] < STUCK
+            jacobian, moving, turn = self._motion(foot, step, positions[own].mean(axis=0), body)
+            speed, drift = moving
+            if close and (loaded or (soon and feet.velocity[foot, step, 2] < DOWN * units.length * units.frequency)):
+                standing.append(self._standing(jacobian, speed, drift, turn))
+                for point in own:
+                    arm = skew(positions[point] - positions[own].mean(axis=0))
+                    points.append(int(point))
+                    jacobians.append(jacobian[:3] - arm @ jacobian[3:])
+                    cones.append(self._cone(normals[:, point], tangents[:, 2 * point : 2 * point + 2]))
             else:
-                e = np.concatenate([feet.middle[j, step] - mid, tilt])
-                acc = feet.acceleration[j, step] + g.foot * rate**2 * e + g.foot_rate * rate * (feet.velocity[j, step] - vf)
-                if loaded:  # it is late: down
-                    acc[2] = g.foot_rate * rate * (-0.0126 * u.length * rate - vf[2])
-                swings.append((J, acc - Jdv, soon))
-        for J, acc, soon in swings:
-            A.append(J)
-            a.append(acc)
-            ww = w.foot if active else (0.025 * w.foot if soon else 0.0)
-            W.append(np.repeat([ww / u.gravity**2, ww / rate**4], 3))
-        load = float(feet.load[:, step].sum())
-        free = max(0.0, 1.0 - load / u.force) if active else 1.0
-        r = com - data.xpos[1]
-        S = np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]])
-        f = plan.contact_forces[step]
-        axes = -data.site_xmat[sim.jets].reshape(-1, 3, 3)[:, :, 2]
-        fT = axes * state.thrust[:, None]
-        mT = np.cross(data.site_xpos[sim.jets] - com, fT).sum(0)
-        arms = self._contact_arms[step]
-        if self.total:
-            force = f.sum(0) + fT.sum(0) + mass * grav + self._dw[:3]
-            moment = np.cross(arms, f).sum(0) + np.cross(f.sum(0), self._xi[:3]) + mT + self._dw[3:]
-        else:
-            kx = np.array([g.com, g.com, g.height]) * rate**2
-            dx = np.array([g.com_rate, g.com_rate, g.height_rate]) * rate
-            if self.ff == "force":
-                force = f.sum(0) + fT.sum(0) + mass * grav
-                moment = np.cross(arms, f).sum(0) + mT
-                if self.ideal:
-                    aT = axes * plan.thrust[step][:, None]
-                    force = force - fT.sum(0) + aT.sum(0)
-                    moment = moment - mT + np.cross(data.site_xpos[sim.jets] - com, aT).sum(0)
-            else:
-                force = mass * plan.com_acceleration[step]
-                moment = plan.angular_momentum_rate[step]
-            force = force - mass * (kx * self._xi[:3] + dx * self._xi[3:6])
-            moment = moment - g.spin_rate * rate * self._xi[9:12]
-        A.append(M[:3] / mass)
-        a.append((force - h[:3] - mass * grav) / mass)
-        W.append(np.full(3, w.com / u.gravity**2))
-        A.append(R @ M[3:6] - S @ M[:3])
-        a.append(moment - (R @ h[3:6] - S @ h[:3]) )
-        W.append(np.full(3, w.spin / u.moment**2))
-        AR = np.zeros((3, N))
-        AR[:, 3:6] = R
-        turn = rotation_vector(plan.rotation[step] @ R.T)
-        A.append(AR)
-        a.append(plan.base_acceleration[step, 3:] + g.base * rate**2 * turn + g.base_rate * rate * (plan.base_velocity[step, 3:] - R @ v[3:6]))
-        W.append(np.full(3, (w.base if active else w.base_in_flight) / rate**4))
-        As = np.zeros((n, N))
-        As[:, 6:] = np.eye(n)
-        A.append(As)
-        a.append(plan.joint_accelerations[step] + g.joint * rate**2 * (plan.joints[step] + self._shift - state.joint_positions) + g.joint_rate * rate * (plan.joint_velocities[step] - state.joint_velocities))
-        W.append((np.where(self._legs, w.legs, w.others) if active else np.full(n, w.flying)) / rate**4)
-        self.dbg = (A, a, W)
-        A_, a_, W_ = np.vstack(A), np.concatenate(a), np.concatenate(W)
-        nf = 3 * len(active)
-        size = N + nf
-        H, q = np.zeros((size, size)), np.zeros(size)
-        WA = W_[:, None] * A_
-        H[:N, :N] = A_.T @ WA
-        q[:N] = -a_ @ WA
-        ff = w.force / u.force**2
-        H[range(N, size), range(N, size)] += ff
-        q[N:] = -ff * plan.contact_forces[step][active].ravel()
-        J = np.vstack(Jc) if Jc else np.zeros((0, N))
-        T = np.hstack([M[6:], -J.T[6:]])
-        t0 = h[6:] - Fj[6:]
-        wt = w.torque / u.moment**2
-        H += wt * T.T @ T
-        q += wt * t0 @ T
-        H[range(N), range(N)] += 1e-6
-        Aeq = np.hstack([M[:6], -J.T[:6]])
-        beq = Fj[:6] - h[:6]
-        K = len(self._cone)
-        limited = np.isfinite(self._limits)
-        rows = np.zeros((K * len(active) + int(limited.sum()), size))
-        for i in range(len(active)):
-            rows[K * i : K * i + K, N + 3 * i : N + 3 * i + 3] = self._cone
-        rows[K * len(active) :] = T[limited]
-        lower = np.concatenate([np.full(K * len(active), -np.inf), (-self._limits - t0)[limited]])
-        upper = np.concatenate([np.zeros(K * len(active)), (self._limits - t0)[limited]])
-        import time as clock
-        started = clock.process_time()
-        x = self._quadratic(H, q, Aeq, beq, rows, lower, upper)
-        self.solve_time += clock.process_time() - started
-        if x is None:
-            self.failures += 1
-            tau = np.clip(t0, -self._limits, self._limits)
-            return tau, plan.joint_accelerations[step]
-        tau = np.clip(T @ x + t0, -self._limits, self._limits)
-        return tau, x[6:N]
+                error = np.concatenate([feet.middle[foot, step] - positions[own].mean(axis=0), turn])
+                swinging.append((jacobian, self._swing(foot, step, error, speed, late=bool(loaded)) - drift, soon))
+        weights = self._weights
+        for jacobian, wanted, soon in swinging:
+            weight = weights.foot if points else weights.foot_soon * soon
+            standing.append(_Task(matrix=jacobian, wanted=wanted, weight=self._weight(weight)))
+        return standing, self._contacts(points, jacobians, cones)
 
-    def _quadratic(self, H, q, A, b, rows, lower, upper):
-        piqp = solver_module()
-        solver = piqp.DenseSolver()
-        s = solver.settings
-        s.verbose = False
-        s.compute_timings = False
-        s.eps_abs = 1e-5
-        s.eps_rel = 1e-5
-        s.max_iter = 60
-        u, N = self._units, 6 + len(self._robot.joint_names)
-        D = np.concatenate([np.full(3, u.gravity), np.full(N - 3, u.frequency**2), np.full(len(q) - N, u.force)])
-        E = np.repeat([u.force, u.moment], 3)
-        F = np.full(len(rows), u.force)
-        F[len(rows) - int(np.isfinite(self._limits).sum()) :] = u.moment
-        solver.setup(
-            np.asfortranarray(D[:, None] * H * D), D * q, np.asfortranarray(A * D / E[:, None]), b / E,
-            np.asfortranarray(rows * D / F[:, None]), lower / F, upper / F)
-        status = solver.solve()
-        self.iters = getattr(self, "iters", 0) + solver.result.info.iter
-        if status != piqp.PIQP_SOLVED:
-            self.status = status
-            if status != piqp.PIQP_MAX_ITER_REACHED:
-                return None
-        return D * solver.result.x
+    def _motion(self, foot: int, step: int, middle: Array, body: int) -> tuple[Array, tuple[Array, Array], Array]:
+        """Return a foot's Jacobian, its velocity and J̇ ν, and how far it is turned from the plan [rad].
+
+        Args:
+            foot: its number.
+            step: row of the plan.
+            middle: of its contact points [m], (3,).
+            body: MuJoCo's number of it.
+        """
+        model, data = self._belief.simulation.model, self._belief.data
+        rate = np.zeros((6, model.nv))
+        mujoco_module().mj_jacDot(model, data, rate[:3], rate[3:], middle, body)
+        turn = rotation_vector(self._feet.rotation[foot, step] @ data.xmat[body].reshape(3, 3).T)
+        both = np.zeros((6, model.nv))
+        mujoco_module().mj_jac(model, data, both[:3], both[3:], middle, body)
+        return both @ self._belief.of_joints, (both @ data.qvel, rate @ data.qvel), turn
+
+    def _weight(self, weight: float) -> Array:
+        """Return a weight of linear and turning accelerations, (6,), from that in the robot's own units."""
+        return weight * np.repeat([self._units.gravity**-2, self._units.frequency**-4], 3)
+
+    def _standing(self, jacobian: Array, speed: Array, drift: Array, turn: Array) -> _Task:
+        """Return the task of a foot that stands: it comes to rest, level where the plan has it so.
+
+        Args:
+            jacobian: of the foot.
+            speed: its velocity [m/s, rad/s], (6,).
+            drift: J̇ ν, (6,).
+            turn: how far it is turned from the plan [rad], (3,).
+        """
+        rate = self._gains.stance_rate * self._units.frequency
+        wanted = -rate * speed
+        wanted[3:5] += 0.25 * rate**2 * turn[:2]
+        return _Task(matrix=jacobian, wanted=wanted - drift, weight=self._weight(self._weights.stance))
+
+    def _swing(self, foot: int, step: int, error: Array, speed: Array, *, late: bool) -> Array:
+        """Return the acceleration of a foot in the air [m/s², rad/s²], (6,).
+
+        Args:
+            foot: its number.
+            step: row of the plan.
+            error: from where it is to the plan [m, rad], (6,).
+            speed: its velocity [m/s, rad/s], (6,).
+            late: it should stand already.
+        """
+        gains, units, feet = self._gains, self._units, self._feet
+        damping = gains.foot_rate * units.frequency
+        wanted = feet.acceleration[foot, step] + gains.foot * units.frequency**2 * error
+        wanted = wanted + damping * (feet.velocity[foot, step] - speed)
+        if late:
+            wanted[2] = damping * (-DOWN * units.length * units.frequency - speed[2])
+        return np.asarray(wanted)
+
+    def _cone(self, normal: Array, tangents: Array) -> Array:
+        """Return the rows of a pyramid within the friction cone: C f ≤ 0, (sides, 3)."""
+        friction = FRICTION_SHARE * self._belief.friction * np.cos(np.pi / SIDES)
+        angles = 2.0 * np.pi * (np.arange(SIDES) + 0.5) / SIDES
+        return np.asarray(np.outer(np.cos(angles), tangents[:, 0]) + np.outer(np.sin(angles), tangents[:, 1]) - friction * normal)
+
+    def _contacts(self, points: list[int], jacobians: list[Array], cones: list[Array]) -> _Contacts:
+        rows = np.zeros((SIDES * len(points), 3 * len(points)))
+        for index, cone in enumerate(cones):
+            rows[SIDES * index : SIDES * (index + 1), 3 * index : 3 * (index + 1)] = cone
+        columns = self._belief.of_joints.shape[1]
+        return _Contacts(points=points, jacobian=np.vstack([np.zeros((0, columns)), *jacobians]), cones=rows)
+
+    def _momentum(self, mass: Array, bias: Array, step: int, errors: Array) -> tuple[_Task, _Task]:
+        """Return the tasks of the momentum's rates.
+
+        Args:
+            mass: M.
+            bias: h.
+            step: row of the plan.
+            errors: of CoM, its velocity, the attitude and the angular momentum.
+        """
+        gains, units, plan, data = self._gains, self._units, self._plan, self._belief.data
+        turn, arm, rate = self._belief.rotation, skew(data.subtree_com[1] - data.xpos[1]), units.frequency
+        gravity = self._belief.simulation.robot.gravity
+        stiffness = np.array([gains.com, gains.com, gains.height]) * rate**2
+        damping = np.array([gains.com_rate, gains.com_rate, gains.height_rate]) * rate
+        linear = plan.com_acceleration[step] - stiffness * errors[:3] - damping * errors[3:6]
+        angular = plan.angular_momentum_rate[step] - gains.spin_rate * rate * errors[9:12]
+        return (
+            _Task(
+                matrix=mass[:3] / units.mass,
+                wanted=linear - bias[:3] / units.mass - gravity,
+                weight=np.full(3, self._weights.com / units.gravity**2),
+            ),
+            _Task(
+                matrix=turn @ mass[3:6] - arm @ mass[:3],
+                wanted=angular - (turn @ bias[3:6] - arm @ bias[:3]),
+                weight=np.full(3, self._weights.spin / units.moment**2),
+            ),
+        )
+
+    def _attitude(self, step: int, stands: bool) -> _Task:
+        """Return the task of the base's attitude."""
+        gains, plan, rate, turn = self._gains, self._plan, self._units.frequency, self._belief.rotation
+        matrix = np.zeros((3, self._belief.of_joints.shape[1]))
+        matrix[:, 3:6] = turn
+        away = rotation_vector(plan.rotation[step] @ turn.T)
+        slow = plan.base_velocity[step, 3:] - turn @ self._belief.data.qvel[3:6]
+        wanted = plan.base_acceleration[step, 3:] + gains.base * rate**2 * away + gains.base_rate * rate * slow
+        weight = self._weights.base if stands else self._weights.base_in_flight
+        return _Task(matrix=matrix, wanted=wanted, weight=np.full(3, weight / rate**4))
+
+    def _posture(self, state: State, step: int, stands: bool) -> _Task:
+        """Return the task of the joints.
+
+        Args:
+            state: as it was measured.
+            step: row of the plan.
+            stands: a foot stands.
+        """
+        gains, plan, rate, weights = self._gains, self._plan, self._units.frequency, self._weights
+        count = self._shift.size
+        away = plan.joints[step] + self._shift - state.joint_positions
+        slow = plan.joint_velocities[step] - state.joint_velocities
+        wanted = plan.joint_accelerations[step] + gains.joint * rate**2 * away + gains.joint_rate * rate * slow
+        weight = np.where(self._legs, weights.legs, weights.others) if stands else np.full(count, weights.flying)
+        return _Task(matrix=np.eye(count, count + 6, 6), wanted=wanted, weight=weight / rate**4)
+
+    def _least(self, tasks: list[_Task], contacts: _Contacts, mass: Array, bias: Array, step: int) -> Array:
+        """Return the torques of the program's solution [N m or N], (n,).
+
+        Its unknowns are ν̇ and f in the robot's own units, so that all are about as large.
+
+        Args:
+            tasks: what is wanted of ν̇.
+            contacts: the points that may push.
+            mass: M.
+            bias: h − J_Tᵀ T.
+            step: row of the plan.
+        """
+        units, size = self._units, len(mass)
+        matrix, weight = np.vstack([task.matrix for task in tasks]), np.concatenate([task.weight for task in tasks])
+        wanted, count = np.concatenate([task.wanted for task in tasks]), 3 * len(contacts.points)
+        scale = np.repeat([units.gravity, units.frequency**2, units.force], [3, size - 3, count])
+        torques = np.hstack([mass[6:], -contacts.jacobian.T[6:]]) * scale / units.moment
+        offset, limits = bias[6:] / units.moment, self._limits() / units.moment
+        hessian = self._weights.torque * torques.T @ torques
+        gradient = self._weights.torque * offset @ torques
+        weighted = weight[:, None] * matrix * scale[:size]
+        hessian[:size, :size] += (matrix * scale[:size]).T @ weighted
+        gradient[:size] -= wanted @ weighted
+        of_force = self._weights.force
+        hessian[range(len(scale)), range(len(scale))] += np.repeat([1e-6, of_force], [size, count])
+        gradient[size:] -= of_force * self._plan.contact_forces[step][contacts.points].ravel() / units.force
+        share = np.repeat([units.force, units.moment], 3)
+        base = np.hstack([mass[:6], -contacts.jacobian.T[:6]]) * scale / share[:, None]
+        limited = np.isfinite(limits)
+        rows = np.zeros((len(contacts.cones) + int(limited.sum()), len(scale)))
+        rows[: len(contacts.cones), size:], rows[len(contacts.cones) :] = contacts.cones, torques[limited]
+        lower = np.concatenate([np.full(len(contacts.cones), -np.inf), (-limits - offset)[limited]])
+        upper = np.concatenate([np.zeros(len(contacts.cones)), (limits - offset)[limited]])
+        found = _quadratic(hessian, gradient, base, -bias[:6] / share, rows, lower, upper)
+        if found is None:  # no forces hold it; the servos do what they can
+            return np.clip(self._torques, -self._limits(), self._limits())
+        return np.clip((torques @ found + offset) * units.moment, -self._limits(), self._limits())
+
+    def _limits(self) -> Array:
+        assert self._robot is not None
+        return self._robot.joint_limits.effort
+
+
+def _quadratic(
+    hessian: Array, gradient: Array, equal: Array, to: Array, rows: Array, lower: Array, upper: Array
+) -> Array | None:
+    """Return x of least ½ xᵀ H x + gᵀ x with A x = b and l ≤ C x ≤ u; None where there is none.
+
+    Args:
+        hessian: H.
+        gradient: g.
+        equal: A.
+        to: b.
+        rows: C.
+        lower: l.
+        upper: u.
+    """
+    piqp = solver_module()
+    solver = piqp.DenseSolver()
+    solver.settings.verbose = False
+    solver.settings.eps_abs = solver.settings.eps_rel = ACCURACY
+    solver.settings.max_iter = ITERATIONS
+    matrices = [np.asfortranarray(part) for part in (hessian, equal, rows)]
+    solver.setup(matrices[0], gradient, matrices[1], to, matrices[2], lower, upper)
+    status = solver.solve()
+    if status not in (piqp.PIQP_SOLVED, piqp.PIQP_MAX_ITER_REACHED):
+        return None
+    return np.array(solver.result.x)
