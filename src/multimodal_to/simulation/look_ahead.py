@@ -2,7 +2,7 @@
 
 Turbines are slow: half a second before a foot leaves the ground, thrusts have to be on the way to what the flight needs.
 So the gains come from a linear-quadratic problem along the whole plan, solved backwards once, when a plan is taken over.
-With the errors ξ = (x, ẋ, θ, hω, T, Ṫ) of CoM, attitude, angular momentum and thrusts, in the robot's own units,
+With the errors ξ = (x, ẋ, θ, hω, ∫x, ∫θ, T, Ṫ) of CoM, attitude, angular momentum and thrusts, in the robot's own units,
 
     m ẍ = Σ a_i T_i + θ × f_T + F            a_i where jet i pushes, f_T the planned sum of the thrusts
     I θ̇ = hω
@@ -33,7 +33,8 @@ from multimodal_to.simulation.units import Units
 GRID = 0.02  # between two rows of the gains [s]
 SETTLING = 4.0  # how long the end is held for the gains there [s]
 TURBINE = 0.5  # how long a turbine takes, roughly [s]
-FLYING = 0.1  # joints help only while the feet carry less than this [m g]
+FLYING = 0.4  # joints help only while the feet carry less than this [m g]
+FORGETTING = 1.0  # time constant with which sums of errors go while a foot stands [s]
 JOINT_MAX = 0.3  # how far a joint leaves the plan [rad or m]
 
 
@@ -41,100 +42,114 @@ JOINT_MAX = 0.3  # how far a joint leaves the plan [rad or m]
 class LookAhead:
     """How large errors and inputs may be; all of them count alike when they are so large."""
 
-    place: float = 0.05  # of the CoM [L]
+    place: float = 0.05  # of the CoM, level [L]
+    height: float = 0.03  # of the CoM, along z [L]
     velocity: float = 0.1  # [√(g L)]
     tilt: float = 0.1  # [rad]
     spin: float = 0.02  # of the angular momentum [m L √(g L)]
+    place_sum: float = 0.4  # of the CoM over time, in flight [L √(L/g)]
+    tilt_sum: float = 1.0  # over time, in flight [√(L/g)]
     throttle: float = 0.5  # of its range [1]
     load: float = 0.5  # of a contact force, as a share of the planned load of its point [1]
     joint: float = 0.05  # of a joint between base and jets [rad]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class _Gains:
+    """What is done about ξ along a plan, SI units, world axes; a row for each of some of its rows."""
+
+    throttle: Array  # of u [%], (rows, jets, 18 + 2 jets)
+    joints: Array  # of s [rad or m], (rows, n, 18 + 2 jets)
+    turning: Array  # I⁻¹ ∂hω/∂ṡ: how joints turn against the whole, (rows, 3, n)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Advice:
+    """What the feedback sees and what it adds to the plan."""
+
+    errors: Array  # ξ, SI units, (18 + 2 jets,)
+    throttle: Array  # [%], (jets,)
+    joints: Array  # [rad or m], (n,)
+
+
 class Feedback:
-    """Gains along a plan: what is done about ξ = (x, ẋ, θ, hω, T, Ṫ), SI units, world axes; a row for each time."""
+    """Gains along a plan, and the sums of the errors in flight.
 
-    every: int  # so many rows of the plan have the same gains
-    throttle: Array  # of u [%], (steps, jets, 12 + 2 jets)
-    joints: Array  # of s [rad or m], (steps, n, 12 + 2 jets)
-    turning: Array  # I⁻¹ ∂hω/∂ṡ: how joints turn against the whole, (steps, 3, n)
+    There are two sets of gains: for feet that stand as planned, and for a robot that no foot carries, whatever the plan
+    says: one that lands late still has to fly.
 
-    @classmethod
-    def along(cls, belief: Belief, plan: Reference, period: float, how: LookAhead) -> Feedback:
-        """Return the gains along a plan.
+    Args:
+        belief: robot and ground; its state is lost.
+        plan: with rows a `period` apart.
+        period: [s].
+        how: how large errors and inputs may be.
+    """
 
-        Args:
-            belief: robot and ground; its state is lost.
-            plan: with rows a `period` apart.
-            period: [s].
-            how: how large errors and inputs may be.
-        """
-        every = max(round(GRID / period), 1)
-        rows = range(0, len(plan.com), every)
-        systems = [_System.at(belief, plan, row, round(TURBINE / period), how) for row in rows]
-        robot, units = belief.simulation.robot, Units.of(belief.simulation.robot)
-        jets = len(robot.jets)
-        rate, length, force = units.frequency, units.length, units.force
-        sizes = [how.place * length, how.velocity * length * rate, how.tilt, how.spin * units.moment / rate]
-        own = np.concatenate([np.repeat(sizes, 3), np.full(2 * jets, np.inf)])
-        cost = np.diag(1.0 / own**2)
-        scale = np.concatenate(
-            [np.repeat([length, length * rate, 1.0, units.moment / rate], 3), np.full(jets, force), np.full(jets, force * rate)]
-        )
-        weight = scale[:, None] * cost * scale * (GRID * rate)
-        value = weight * 10.0
-        gains = np.zeros((len(systems), systems[0].inputs.shape[1], own.size))
-        for _ in range(round(SETTLING / GRID)):
-            value, _ = _backward(systems[-1], value, weight, scale, rate)
-        for index in reversed(range(len(systems))):
-            value, gains[index] = _backward(systems[index], value, weight, scale, rate)
-        spreads = np.array([system.spreads for system in systems])
-        done = np.einsum("kij,kjl->kil", spreads, gains)
-        return cls(
-            every=every,
-            throttle=done[:, :jets],
-            joints=done[:, jets + 6 :],
-            turning=np.array([system.turning for system in systems]),
-        )
+    def __init__(self, belief: Belief, plan: Reference, period: float, how: LookAhead) -> None:
+        self._belief, self._plan, self._period = belief, plan, period
+        self._every = max(round(GRID / period), 1)
+        self._standing = self._gains(how, stands=True)
+        self._flying = self._gains(how, stands=False) if belief.simulation.robot.jets else self._standing
+        self._sums = np.zeros(6)
 
-    def errors(self, belief: Belief, plan: Reference, step: int, state: State) -> Array:
-        """Return ξ, SI units, (12 + 2 jets,).
+    def advise(self, state: State, step: int) -> Advice:
+        """Return what is added to a row of the plan.
 
-        The attitude is that of the whole robot, whose angular velocity is I⁻¹ hω: the base's, and what the joints have
-        turned against it.
+        The attitude in ξ is that of the whole robot, whose angular velocity is I⁻¹ hω: the base's, and what the joints
+        have turned against it.
 
         Args:
-            belief: robot and ground in the state.
-            plan: whose gains these are.
+            state: as it was measured, which `belief` has taken over.
             step: row of the plan.
-            state: as it was measured.
         """
-        data = belief.data
-        joints = self.turning[self._row(step)] @ (state.joint_positions - plan.joints[step])
-        return np.concatenate(
+        data, plan = self._belief.data, self._plan
+        stands = bool(data.ncon)
+        gains = self._standing if stands else self._flying
+        row = min(round(step / self._every), len(gains.turning) - 1)
+        place = data.subtree_com[1] - plan.com[step]
+        turn = rotation_vector(self._belief.rotation @ plan.rotation[step].T)
+        turn = turn + gains.turning[row] @ (state.joint_positions - plan.joints[step])
+        rate = -self._sums / FORGETTING if stands else np.concatenate([place, turn])
+        self._sums = self._sums + self._period * rate
+        errors = np.concatenate(
             [
-                data.subtree_com[1] - plan.com[step],
+                place,
                 data.subtree_linvel[1] - plan.com_velocity[step],
-                rotation_vector(belief.rotation @ plan.rotation[step].T) + joints,
+                turn,
                 data.subtree_angmom[1] - plan.angular_momentum[step],
+                self._sums,
                 state.thrust - plan.thrust[step],
                 state.thrust_rate - plan.thrust_rate[step],
             ]
         )
+        joints = np.clip(gains.joints[row] @ errors, -JOINT_MAX, JOINT_MAX)
+        return Advice(errors=errors, throttle=gains.throttle[row] @ errors, joints=joints)
 
-    def answer(self, step: int, errors: Array) -> tuple[Array, Array]:
-        """Return what is added to the throttles [%], (jets,), and to the joints [rad or m], (n,).
-
-        Args:
-            step: row of the plan.
-            errors: ξ.
-        """
-        row = self._row(step)
-        joints = np.clip(self.joints[row] @ errors, -JOINT_MAX, JOINT_MAX)
-        return self.throttle[row] @ errors, joints
-
-    def _row(self, step: int) -> int:
-        return min(round(step / self.every), len(self.throttle) - 1)
+    def _gains(self, how: LookAhead, *, stands: bool) -> _Gains:
+        belief, plan, robot = self._belief, self._plan, self._belief.simulation.robot
+        jets, units = len(robot.jets), Units.of(robot)
+        ahead = round(TURBINE / self._period)
+        systems = [
+            _System.at(belief, plan, row, ahead, how, stands=stands) for row in range(0, len(plan.com), self._every)
+        ]
+        turning = np.array([system.turning for system in systems])
+        if not jets:
+            none = np.zeros((len(systems), 0, 18))
+            return _Gains(throttle=none, joints=np.zeros((len(systems), turning.shape[2], 18)), turning=turning)
+        rate, length, spin = units.frequency, units.length, units.moment / units.frequency
+        unit = np.repeat([length, length * rate, 1.0, spin, length / rate, 1.0 / rate], 3)
+        unit = np.concatenate([unit, np.full(jets, units.force), np.full(jets, units.force * rate)])
+        sizes = [how.place, how.place, how.height]
+        sizes += [size for size in (how.velocity, how.tilt, how.spin, how.place_sum, how.tilt_sum) for _ in range(3)]
+        weight = np.diag(np.concatenate([1.0 / np.array(sizes) ** 2, np.zeros(2 * jets)])) * GRID * rate
+        value, found = weight, list[Array]()
+        for _ in range(round(SETTLING / GRID)):
+            value, _ = _backward(systems[-1], value, weight, unit, rate)
+        for system in reversed(systems):
+            value, gain = _backward(system, value, weight, unit, rate)
+            found.append(system.spreads @ gain)
+        done = np.array(found[::-1])
+        return _Gains(throttle=done[:, :jets], joints=done[:, jets + 6 :], turning=turning)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -147,7 +162,7 @@ class _System:
     turning: Array  # I⁻¹ ∂hω/∂ṡ, (3, n)
 
     @classmethod
-    def at(cls, belief: Belief, plan: Reference, row: int, every: int, how: LookAhead) -> _System:
+    def at(cls, belief: Belief, plan: Reference, row: int, ahead: int, how: LookAhead, *, stands: bool) -> _System:
         simulation, data = belief.simulation, belief.data
         robot = simulation.robot
         jets, count = len(robot.jets), len(robot.joint_names)
@@ -158,31 +173,32 @@ class _System:
         arms = data.site_xpos[simulation.jets] - com
         thrusts = axes * plan.thrust[row][:, None]
         moments = np.cross(arms, thrusts)
-        points, forces = data.geom_xpos[simulation.points] - com, plan.contact_forces[row]
+        points, forces = data.geom_xpos[simulation.points] - com, plan.contact_forces[row] * stands
         load = np.maximum(forces[:, 2], 0.0)
         units = Units.of(robot)
-        soon = plan.contact_forces[row : row + every, :, 2].sum(axis=1).min(initial=units.force)
-        free = float(np.clip(1.0 - soon / units.force, 0.0, 1.0))
+        soon = plan.contact_forces[row : row + ahead, :, 2].sum(axis=1).min(initial=units.force)
+        free = float(np.clip(1.0 - soon / units.force, 0.0, 1.0)) if stands else 1.0
 
         own, spin = _inertia(belief, com)
         counter = np.linalg.solve(own, spin)
-        size = 12 + 2 * jets
+        size = 18 + 2 * jets
         errors = np.zeros((size, size))
         errors[0:3, 3:6] = np.eye(3)
         errors[3:6, 6:9] = -skew(thrusts.sum(axis=0)) / units.mass
         errors[6:9, 9:12] = np.linalg.inv(own)
         errors[9:12, 0:3] = skew(forces.sum(axis=0))
         errors[9:12, 6:9] = -skew(moments.sum(axis=0))
-        errors[3:6, 12 : 12 + jets] = axes.T / units.mass
-        errors[9:12, 12 : 12 + jets] = np.cross(arms, axes).T
-        errors[12 : 12 + jets, 12 + jets :] = np.eye(jets)
+        errors[12:15, 0:3] = errors[15:18, 6:9] = np.eye(3)
+        errors[3:6, 18 : 18 + jets] = axes.T / units.mass
+        errors[9:12, 18 : 18 + jets] = np.cross(arms, axes).T
+        errors[18 : 18 + jets, 18 + jets :] = np.eye(jets)
         spreads = np.zeros((jets + 6 + count, jets + 6 + count))
         effect = np.zeros((size, jets + 6 + count))
         for index, jet in enumerate(robot.jets):
             of_thrust, of_rate, of_throttle = _slopes(jet, *(getattr(plan, name)[row, index] for name in ("thrust", "thrust_rate", "throttle")))
-            errors[12 + jets + index, 12 + index] = of_thrust
-            errors[12 + jets + index, 12 + jets + index] = of_rate
-            effect[12 + jets + index, index] = of_throttle
+            errors[18 + jets + index, 18 + index] = of_thrust
+            errors[18 + jets + index, 18 + jets + index] = of_rate
+            effect[18 + jets + index, index] = of_throttle
             spreads[index, index] = how.throttle * max(free, 1e-3) * (jet.throttle_max - jet.throttle_min)
         of_point = np.hstack([np.vstack([np.eye(3), skew(point)]) for point in points]) if len(points) else np.zeros((6, 0))
         spread = (how.load * load[:, None] * np.array([belief.friction, belief.friction, 1.0])).ravel()

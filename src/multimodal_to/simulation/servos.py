@@ -69,7 +69,7 @@ class ServoController:
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
         units, gains = Units.of(robot), self._gains
         self._balance = Balance(gains=gains, units=units, inertia=inertia(robot), friction=self._belief.friction)
-        self._feedback = Feedback.along(self._belief, self._plan, PERIOD, gains.look_ahead)
+        self._feedback = Feedback(self._belief, self._plan, PERIOD, gains.look_ahead)
         count = len(robot.joint_names)
         self._servo = (
             np.full(count, gains.stiffness * units.moment),
@@ -90,9 +90,9 @@ class ServoController:
         plan, step = self._plan, row_of(time - self._since, PERIOD, self._plan)
         torques, throttle = plan.torques[step], plan.throttle[step]
         if self._stabilise:
-            change, joints = self._feedback.answer(step, self._feedback.errors(self._belief, plan, step, state))
-            throttle = around(self._robot.jets, plan, step, change)
-            self._shift = self._shift + (joints - self._shift) * PERIOD / JOINT_LAG
+            advice = self._feedback.advise(state, step)
+            throttle = around(self._robot.jets, plan, step, advice.throttle)
+            self._shift = self._shift + (advice.joints - self._shift) * PERIOD / JOINT_LAG
             torques = torques - self._borne_by_joints(state, step)
         servos = Servos(
             positions=plan.joints[step] + self._shift,

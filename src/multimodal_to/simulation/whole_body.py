@@ -161,7 +161,7 @@ class WholeBodyController:
         self._units, self._belief = Units.of(robot), Belief(robot, plan)
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
         self._feet = PlannedFeet.along(self._belief, self._plan, PERIOD)
-        self._feedback = Feedback.along(self._belief, self._plan, PERIOD, self._gains.look_ahead)
+        self._feedback = Feedback(self._belief, self._plan, PERIOD, self._gains.look_ahead)
         scenario = stored(plan)
         surface = FlatGround() if scenario is None else scenario.surface
         self._ground = frame_function(surface).map(len(robot.contacts)) if robot.contacts else None
@@ -195,17 +195,16 @@ class WholeBodyController:
         assert self._robot is not None
         self._belief.put(state)
         plan, step = self._plan, row_of(time - self._since, PERIOD, self._plan)
-        errors = self._feedback.errors(self._belief, plan, step, state)
-        throttle, joints = self._feedback.answer(step, errors)
-        self._shift = self._shift + (joints - self._shift) * PERIOD / JOINT_LAG
-        self._torques = self._solve(state, step, time, errors)
+        advice = self._feedback.advise(state, step)
+        self._shift = self._shift + (advice.joints - self._shift) * PERIOD / JOINT_LAG
+        self._torques = self._solve(state, step, time, advice.errors)
         servos = Servos(
             positions=plan.joints[step] + self._shift,
             velocities=plan.joint_velocities[step],
             stiffness=self._servo[0],
             damping=self._servo[1],
         )
-        return Command(torques=self._torques, throttle=around(self._robot.jets, plan, step, throttle), servos=servos)
+        return Command(torques=self._torques, throttle=around(self._robot.jets, plan, step, advice.throttle), servos=servos)
 
     def _solve(self, state: State, step: int, time: float, errors: Array) -> Array:
         """Return the torques of the joints [N m or N], (n,).
