@@ -51,9 +51,7 @@ def simulate(
     ] = 2,
     push: Annotated[
         float | None,
-        typer.Option(
-            parser=number_option, metavar="NEWTON", help="Force that pushes for 0.2 s. [0.114 of the weight]"
-        ),
+        typer.Option(parser=number_option, metavar="NEWTON", help="Force that pushes for 0.2 s. [0.114 of the weight]"),
     ] = None,
     noise: Annotated[
         bool, typer.Option("--noise", help="Let the controller see sensors with noise and a base that drifts.")
@@ -73,11 +71,7 @@ def simulate(
     Example: multimodal-to simulate results/take-off/trajectory.npz --trials 20 --seed 1
     """
     target = output or file.with_stem(f"{file.stem}-simulated")
-    if target.suffix.lower() != ".npz":
-        raise OutputError(f"'{target}' is no .npz")
-    for name, value in (("--trials", trials), ("--jobs", jobs)):
-        if value is not None and value < 1:
-            raise InputError(f"{name} is {value}; expected at least one")
+    _refuse(target, trials, jobs)
     the_robot, plan = loaded(file, robot)
     from multimodal_to.simulation import Draws, run_trial, simulated_trajectory
 
@@ -100,15 +94,28 @@ def simulate(
     simulated = simulated_trajectory(playback)
     wrote = [simulated.save(target)]
     if film is not None:
-        from multimodal_to.replay import write_html
-
-        wrote.append(write_html(the_robot, simulated, film, ghost=plan))
+        wrote.append(_film(the_robot, plan, simulated, playback.fell, film))
     if as_json:
         print_json(_as_data(plan, draws, done, disturbed=trials is not None))
     else:
         for path in wrote:
             out.print(f"wrote {path}", soft_wrap=True)
     raise typer.Exit(0 if all(trial.survived for trial in done) else 1)
+
+
+def _refuse(target: Path, trials: int | None, jobs: int) -> None:
+    if target.suffix.lower() != ".npz":
+        raise OutputError(f"'{target}' is no .npz")
+    for name, value in (("--trials", trials), ("--jobs", jobs)):
+        if value is not None and value < 1:
+            raise InputError(f"{name} is {value}; expected at least one")
+
+
+def _film(robot: Robot, plan: Trajectory, simulated: Trajectory, fell: float | None, path: Path) -> Path:
+    from multimodal_to.replay import write_html
+
+    marks = {} if fell is None else {float(plan.time[0]) + min(fell, plan.duration): "it fell"}
+    return write_html(robot, simulated, path, ghost=plan, marks=marks)
 
 
 def _as_data(plan: Trajectory, draws: Draws, done: list[Trial], *, disturbed: bool) -> dict[str, Any]:

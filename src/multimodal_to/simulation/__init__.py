@@ -9,6 +9,7 @@ from multimodal_to.simulation.playback import Playback, play
 from multimodal_to.simulation.report import JointTorque, Switch, Tracking, simulated_trajectory, tracking
 from multimodal_to.simulation.servos import ServoController, ServoGains
 from multimodal_to.simulation.trials import Draws, Trial, run_trial, run_trials
+from multimodal_to.simulation.whole_body import WholeBodyController, WholeBodyGains
 
 __all__ = [
     "Command",
@@ -26,6 +27,8 @@ __all__ = [
     "Switch",
     "Tracking",
     "Trial",
+    "WholeBodyController",
+    "WholeBodyGains",
     "build_model",
     "by_mujoco",
     "by_rnea",

@@ -48,7 +48,11 @@ class PlannedFeet:
         velocity = np.zeros((feet, steps, 6))
         velocity[:, :, :3] = np.gradient(middle, period, axis=1)
         turn = rotation[:, 1:] @ rotation[:, :-1].transpose(0, 1, 3, 2)
-        axial = [turn[..., 2, 1] - turn[..., 1, 2], turn[..., 0, 2] - turn[..., 2, 0], turn[..., 1, 0] - turn[..., 0, 1]]
+        axial = [
+            turn[..., 2, 1] - turn[..., 1, 2],
+            turn[..., 0, 2] - turn[..., 2, 0],
+            turn[..., 1, 0] - turn[..., 0, 1],
+        ]
         velocity[:, 1:, 3:] = np.stack(axial, axis=-1) / (2.0 * period)
         load = np.array([plan.contact_forces[:, own, 2].sum(axis=1) for own in members]).reshape(feet, steps)
         return cls(
@@ -57,6 +61,6 @@ class PlannedFeet:
             middle=middle,
             rotation=rotation,
             velocity=velocity,
-            acceleration=np.gradient(velocity, period, axis=1),
+            acceleration=np.asarray(np.gradient(velocity, period, axis=1)),
             load=load,
         )

@@ -11,8 +11,8 @@ from multimodal_to.simulation.controller import Controller
 from multimodal_to.simulation.disturbance import Disturbance, Push
 from multimodal_to.simulation.model import TIME_STEP
 from multimodal_to.simulation.playback import Playback, Player
-from multimodal_to.simulation.servos import ServoController
 from multimodal_to.simulation.reference import reference
+from multimodal_to.simulation.servos import ServoController
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.sameness import refuse_other_robot
 

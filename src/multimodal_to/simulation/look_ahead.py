@@ -1,12 +1,12 @@
 """A feedback that looks along the plan: what thrusts, contact forces and joints do about an error, now and later.
 
-Turbines are slow: half a second before a foot leaves the ground, thrusts have to be on the way to what the flight needs.
-So the gains come from a linear-quadratic problem along the whole plan, solved backwards once, when a plan is taken over.
-With the errors ξ = (x, ẋ, θ, hω, ∫x, ∫θ, T, Ṫ) of CoM, attitude, angular momentum and thrusts, in the robot's own units,
+Turbines are slow: half a second before a foot leaves the ground, thrusts have to be on the way to what the flight
+needs. So the gains come from a linear-quadratic problem along the whole plan, solved backwards once, when a plan is
+taken over. With the errors ξ = (x, ẋ, θ, hω, ∫x, ∫θ, T, Ṫ) of CoM, attitude, angular momentum and thrusts,
 
     m ẍ = Σ a_i T_i + θ × f_T + F            a_i where jet i pushes, f_T the planned sum of the thrusts
     I θ̇ = hω
-    ḣω = Σ (r_i × a_i) T_i + θ × m_T + F_c × x + M      r_i from the CoM, m_T their moment, F_c the planned contact force
+    ḣω = Σ (r_i × a_i) T_i + θ × m_T + F_c × x + M      r_i from the CoM, m_T their moment, F_c the contact force
     T̈ = ∂T̈/∂T T + ∂T̈/∂Ṫ Ṫ + ∂T̈/∂u u
 
 each input has a spread, which is what it may do without much cost: the throttle u; forces at the contact points, as far
@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.simulation.controller import Belief
 from multimodal_to.simulation.model import mujoco_module
@@ -195,12 +194,16 @@ class _System:
         spreads = np.zeros((jets + 6 + count, jets + 6 + count))
         effect = np.zeros((size, jets + 6 + count))
         for index, jet in enumerate(robot.jets):
-            of_thrust, of_rate, of_throttle = _slopes(jet, *(getattr(plan, name)[row, index] for name in ("thrust", "thrust_rate", "throttle")))
+            of_thrust, of_rate, of_throttle = _slopes(
+                jet, *(getattr(plan, name)[row, index] for name in ("thrust", "thrust_rate", "throttle"))
+            )
             errors[18 + jets + index, 18 + index] = of_thrust
             errors[18 + jets + index, 18 + jets + index] = of_rate
             effect[18 + jets + index, index] = of_throttle
             spreads[index, index] = how.throttle * max(free, 1e-3) * (jet.throttle_max - jet.throttle_min)
-        of_point = np.hstack([np.vstack([np.eye(3), skew(point)]) for point in points]) if len(points) else np.zeros((6, 0))
+        of_point = (
+            np.hstack([np.vstack([np.eye(3), skew(point)]) for point in points]) if len(points) else np.zeros((6, 0))
+        )
         spread = (how.load * load[:, None] * np.array([belief.friction, belief.friction, 1.0])).ravel()
         spreads[jets : jets + 6, jets : jets + 6] = _root((of_point * spread**2) @ of_point.T)
         effect[3:6, jets : jets + 3] = np.eye(3) / units.mass
@@ -212,7 +215,7 @@ class _System:
             of_joints = of_joints - (turning @ counter) * of_joints.any(axis=0)
             effect[3:6, jets + 6 :], effect[9:12, jets + 6 :] = of_joints[:3] / units.mass, of_joints[3:]
             spreads[jets + 6 :, jets + 6 :] = how.joint * flying * np.eye(count)
-        return cls(errors=errors, inputs=effect @ spreads, spreads=spreads, turning=counter)
+        return cls(errors=errors, inputs=effect @ spreads, spreads=spreads, turning=np.asarray(counter))
 
 
 def _backward(system: _System, value: Array, weight: Array, scale: Array, rate: float) -> tuple[Array, Array]:

@@ -1,7 +1,7 @@
 """A plan played back in MuJoCo by a controller.
 
-A joint's motor gives the torque of the command and what its servo adds, clipped at the joint's effort limit. Turbines are
-integrated from their own dynamics under the throttle of the command. Commands act after a delay, servos at once.
+A joint's motor gives the torque of the command and what its servo adds, clipped at the joint's effort limit. Turbines
+are integrated from their own dynamics under the throttle of the command. Commands act after a delay, servos at once.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ class ServoController:
 
     Args:
         gains: its numbers.
-        stabilise: let the stabiliser correct thrusts, contact forces and joints; else turbines get the planned throttle.
+        stabilise: let feedback correct thrusts, contact forces and joints; else turbines get the planned throttle.
     """
 
     def __init__(self, gains: ServoGains | None = None, *, stabilise: bool = True) -> None:

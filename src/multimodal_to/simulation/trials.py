@@ -17,15 +17,27 @@ from multimodal_to.simulation.disturbance import GAIN_SPREAD, Disturbance, draw
 from multimodal_to.simulation.playback import Playback, play
 from multimodal_to.simulation.report import tracking
 from multimodal_to.simulation.servos import ServoController, ServoGains
+from multimodal_to.simulation.whole_body import WholeBodyController, WholeBodyGains
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.values import FrozenMapping
 
 Make = Callable[[np.random.Generator | None], Controller]
 """What makes the controller of a trial: with gains drawn from the generator; without one, as they are."""
 
 
-def default_controller(rng: np.random.Generator | None = None) -> Controller:
-    """Return the controller that `play` uses; with a generator its gains are each drawn within ±20 %."""
+def servos(rng: np.random.Generator | None = None) -> Controller:
+    """Return the `ServoController`; with a generator its gains are each drawn within ±20 %."""
     return ServoController(ServoGains() if rng is None else drawn(ServoGains(), rng, GAIN_SPREAD))
+
+
+def whole_body(rng: np.random.Generator | None = None) -> Controller:
+    """Return the `WholeBodyController`; with a generator its gains are each drawn within ±20 %."""
+    return WholeBodyController(WholeBodyGains() if rng is None else drawn(WholeBodyGains(), rng, GAIN_SPREAD))
+
+
+CONTROLLERS: Mapping[str, Make] = FrozenMapping({"servos": servos, "whole-body": whole_body})
+"""The controllers of this library by name; the first one is what `play` and `simulate` use."""
+default_controller: Make = servos
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,9 +110,13 @@ def run_trial(
         disturbance = draw(robot, plan.duration, rng, push=draws.push, noise=draws.noise)
     controller = make(rng)
     playback = play(robot, plan, controller, disturbance=disturbance, torque_limits=torque_limits)
+    return playback, _trial(playback, number or 0, disturbance)
+
+
+def _trial(playback: Playback, number: int, disturbance: Disturbance | None) -> Trial:
     outcome = tracking(playback)
-    return playback, Trial(
-        number=number or 0,
+    return Trial(
+        number=number,
         survived=outcome.survived,
         end=outcome.end,
         fell=outcome.fell,
@@ -148,7 +164,19 @@ def run_trials(
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _alone(
-    robot: Robot, plan: Trajectory, number: int, draws: Draws | None, make: Make, torque_limits: bool
-) -> Trial:
+def gains_alone(robot: Robot, plan: Trajectory, number: int, seed: int, *, make: Make = default_controller) -> Trial:
+    """Play a plan back once with other gains of the controller, and nothing else disturbed.
+
+    Args:
+        robot: that moves.
+        plan: its motion.
+        number: of the playback; it and the seed say which gains.
+        seed: of all of them.
+        make: the controller.
+    """
+    playback = play(robot, plan, make(np.random.default_rng([seed, number])))
+    return _trial(playback, number, None)
+
+
+def _alone(robot: Robot, plan: Trajectory, number: int, draws: Draws | None, make: Make, torque_limits: bool) -> Trial:
     return run_trial(robot, plan, number, draws, make=make, torque_limits=torque_limits)[1]

@@ -22,9 +22,7 @@ class Units:
     @classmethod
     def of(cls, robot: Robot) -> Units:
         """Return the units of a robot; those of the Earth's gravity where the robot has none."""
-        return cls(
-            mass=robot.mass, gravity=float(np.linalg.norm(robot.gravity)) or EARTH, length=robot.standing_height
-        )
+        return cls(mass=robot.mass, gravity=float(np.linalg.norm(robot.gravity)) or EARTH, length=robot.standing_height)
 
     @property
     def frequency(self) -> float:

@@ -204,7 +204,9 @@ class WholeBodyController:
             stiffness=self._servo[0],
             damping=self._servo[1],
         )
-        return Command(torques=self._torques, throttle=around(self._robot.jets, plan, step, advice.throttle), servos=servos)
+        return Command(
+            torques=self._torques, throttle=around(self._robot.jets, plan, step, advice.throttle), servos=servos
+        )
 
     def _solve(self, state: State, step: int, time: float, errors: Array) -> Array:
         """Return the torques of the joints [N m or N], (n,).
@@ -334,7 +336,9 @@ class WholeBodyController:
         """Return the rows of a pyramid within the friction cone: C f ≤ 0, (sides, 3)."""
         friction = FRICTION_SHARE * self._belief.friction * np.cos(np.pi / SIDES)
         angles = 2.0 * np.pi * (np.arange(SIDES) + 0.5) / SIDES
-        return np.asarray(np.outer(np.cos(angles), tangents[:, 0]) + np.outer(np.sin(angles), tangents[:, 1]) - friction * normal)
+        return np.asarray(
+            np.outer(np.cos(angles), tangents[:, 0]) + np.outer(np.sin(angles), tangents[:, 1]) - friction * normal
+        )
 
     def _contacts(self, points: list[int], jacobians: list[Array], cones: list[Array]) -> _Contacts:
         rows = np.zeros((SIDES * len(points), 3 * len(points)))
@@ -434,12 +438,12 @@ class WholeBodyController:
         upper = np.concatenate([np.zeros(len(contacts.cones)), (limits - offset)[limited]])
         found = _quadratic(hessian, gradient, base, -bias[:6] / share, rows, lower, upper)
         if found is None:  # no forces hold it; the servos do what they can
-            return np.clip(self._torques, -self._limits(), self._limits())
-        return np.clip((torques @ found + offset) * units.moment, -self._limits(), self._limits())
+            return np.asarray(np.clip(self._torques, -self._limits(), self._limits()))
+        return np.asarray(np.clip((torques @ found + offset) * units.moment, -self._limits(), self._limits()))
 
     def _limits(self) -> Array:
         assert self._robot is not None
-        return self._robot.joint_limits.effort
+        return np.asarray(self._robot.joint_limits.effort)
 
 
 def _quadratic(
