@@ -5,8 +5,8 @@
 
 A bundled scenario, by its name, is solved first with default options; a trajectory file is played back as it is. Each
 plan is played back once undisturbed, with torques clipped at the joints' effort limits, and then in trials that are
-drawn from the seed. `--gains` adds so many playbacks in which only the controller's gains differ, each within ±20 %, and
-`--noise` so many trials with noise of sensors and an estimate that drifts. `--keep` writes every trial to a JSON file.
+drawn from the seed. `--gains` adds playbacks in which only the controller's gains differ, each within ±20 %, and
+`--noise` trials with noise of sensors and an estimate that drifts. `--keep` writes every trial to a JSON file.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from multimodal_to.models.state import State
 from multimodal_to.simulation.controller import Belief
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference
-from multimodal_to.simulation.stabiliser import rotation_vector, skew
+from multimodal_to.simulation.stabiliser import JOINT_MAX, effect_of_joints, rotation_vector, skew
 from multimodal_to.simulation.units import Units
 
 GRID = 0.02  # between two rows of the gains [s]
@@ -34,7 +34,6 @@ SETTLING = 4.0  # how long the end is held for the gains there [s]
 TURBINE = 0.5  # how long a turbine takes, roughly [s]
 FLYING = 0.4  # joints help only while the feet carry less than this [m g]
 FORGETTING = 1.0  # time constant with which sums of errors go while a foot stands [s]
-JOINT_MAX = 0.3  # how far a joint leaves the plan [rad or m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,7 +209,7 @@ class _System:
         effect[9:12, jets + 3 : jets + 6] = np.eye(3)
         flying = max(0.0, 1.0 - load.sum() / (FLYING * units.force))
         if jets and flying > 0.0:
-            of_joints = _effect_of_joints(belief, com, plan.thrust[row])
+            of_joints = effect_of_joints(simulation, data, com, plan.thrust[row], stands=False)
             turning = -np.vstack([skew(thrusts.sum(axis=0)), skew(moments.sum(axis=0))])
             of_joints = of_joints - (turning @ counter) * of_joints.any(axis=0)
             effect[3:6, jets + 6 :], effect[9:12, jets + 6 :] = of_joints[:3] / units.mass, of_joints[3:]
@@ -237,32 +236,6 @@ def _inertia(belief: Belief, com: Array) -> tuple[Array, Array]:
     mass, arm, turn = belief.mass_matrix(), skew(com - belief.data.xpos[1]), belief.rotation
     inertia = turn @ mass[3:6, 3:6] @ turn.T + belief.simulation.robot.mass * arm @ arm
     return inertia, turn @ mass[3:6, 6:] - arm @ mass[:3, 6:]
-
-
-def _effect_of_joints(belief: Belief, com: Array, thrust: Array) -> Array:
-    """Return ∂w/∂s, (6, n): how joints move the wrench of the thrusts about the CoM while the base stays as it is.
-
-    With a thrust f at p: ∂f = ω × f, and the moment (p − x) × f changes with all three. Joints that turn no jet have no
-    effect here.
-
-    Args:
-        belief: robot and ground in the planned state.
-        com: x [m], (3,).
-        thrust: of each jet [N], (jets,).
-    """
-    mujoco, simulation, data = mujoco_module(), belief.simulation, belief.data
-    model = simulation.model
-    linear, angular, of_com = (np.zeros((3, model.nv)) for _ in range(3))
-    mujoco.mj_jacSubtreeCom(model, data, of_com, 1)
-    effect, moves = np.zeros((6, model.nv)), np.zeros(model.nv, dtype=bool)
-    axes = -data.site_xmat[simulation.jets].reshape(-1, 3, 3)[:, :, 2]
-    for site, force in zip(simulation.jets, axes * thrust[:, None], strict=True):
-        mujoco.mj_jacSite(model, data, linear, angular, site)
-        turned = -skew(force) @ angular
-        effect[:3] += turned
-        effect[3:] += skew(data.site_xpos[site] - com) @ turned - skew(force) @ (linear - of_com)
-        moves |= angular.any(axis=0)
-    return np.asarray((effect * moves) @ simulation.coupling)
 
 
 def _slopes(jet: Any, thrust: float, rate: float, throttle: float) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ from multimodal_to.simulation.controller import Belief, Command, Servos, row_of
 from multimodal_to.simulation.look_ahead import Feedback, LookAhead
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
-from multimodal_to.simulation.stabiliser import Balance, BalanceGains, contact_forces
+from multimodal_to.simulation.stabiliser import Balance, BalanceGains, correct
 from multimodal_to.simulation.turbines import around
 from multimodal_to.simulation.units import Units
 from multimodal_to.trajectory import Trajectory
@@ -92,8 +92,11 @@ class ServoController:
         if self._stabilise:
             advice = self._feedback.advise(state, step)
             throttle = around(self._robot.jets, plan, step, advice.throttle)
-            self._shift = self._shift + (advice.joints - self._shift) * PERIOD / JOINT_LAG
-            torques = torques - self._borne_by_joints(state, step)
+            simulation, data = self._belief.simulation, self._belief.data
+            correction = correct(simulation, data, plan, step, state.thrust, self._balance)
+            joints = advice.joints + correction.joints
+            self._shift = self._shift + (joints - self._shift) * PERIOD / JOINT_LAG
+            torques = torques - self._borne_by_joints(state, step, correction.contact_forces)
         servos = Servos(
             positions=plan.joints[step] + self._shift,
             velocities=plan.joint_velocities[step],
@@ -102,12 +105,13 @@ class ServoController:
         )
         return Command(torques=torques, throttle=throttle, servos=servos)
 
-    def _borne_by_joints(self, state: State, step: int) -> Array:
+    def _borne_by_joints(self, state: State, step: int, forces: Array) -> Array:
         """Return Jᵀ f of the thrusts' difference from the plan and of the forces that are asked of the ground.
 
         Args:
             state: with the thrusts as they are.
             step: row of the plan.
+            forces: that are asked of the ground beside the plan's [N], (contacts, 3).
         """
         assert self._belief is not None
         mujoco, data, simulation = mujoco_module(), self._belief.data, self._belief.simulation
@@ -116,7 +120,6 @@ class ServoController:
             mujoco.mj_jacSite(simulation.model, data, jacobian, None, site)
             axis = -data.site_xmat[site].reshape(3, 3)[:, 2]
             total += jacobian.T @ axis * (state.thrust[index] - self._plan.thrust[step, index])
-        forces = contact_forces(simulation, data, self._plan, step, state.thrust, self._balance)
         for index, force in enumerate(forces):
             if force.any():
                 mujoco.mj_jacGeom(simulation.model, data, jacobian, None, simulation.points[index])
