@@ -43,10 +43,11 @@ class LookAhead:
     place: float = 0.05  # of the CoM, level [L]
     height: float = 0.03  # of the CoM, along z [L]
     velocity: float = 0.1  # [√(g L)]
-    tilt: float = 0.1  # [rad]
+    tilt: float = 0.04  # [rad]
     spin: float = 0.02  # of the angular momentum [m L √(g L)]
     place_sum: float = 0.4  # of the CoM over time, in flight [L √(L/g)]
     tilt_sum: float = 1.0  # over time, in flight [√(L/g)]
+    thrust: float = 0.2  # of a jet, where the feet carry nothing now and soon [m g]
     throttle: float = 0.5  # of its range [1]
     load: float = 0.5  # of a contact force, as a share of the planned load of its point [1]
     joint: float = 0.05  # of a joint between base and jets [rad]
@@ -139,11 +140,16 @@ class Feedback:
         unit = np.concatenate([unit, np.full(jets, units.force), np.full(jets, units.force * rate)])
         sizes = [how.place, how.place, how.height]
         sizes += [size for size in (how.velocity, how.tilt, how.spin, how.place_sum, how.tilt_sum) for _ in range(3)]
-        weight = np.diag(np.concatenate([1.0 / np.array(sizes) ** 2, np.zeros(2 * jets)])) * GRID * rate
-        value, found = weight, list[Array]()
+        value, found = np.diag(np.concatenate([1.0 / np.array(sizes) ** 2, np.zeros(2 * jets)])), list[Array]()
+        weights = []
+        for system in systems:
+            of_thrust = np.full(jets, (how.thrust * max(system.free**2, 1e-3)) ** -2)
+            weights.append(
+                np.diag(np.concatenate([1.0 / np.array(sizes) ** 2, of_thrust, np.zeros(jets)])) * GRID * rate
+            )
         for _ in range(round(SETTLING / GRID)):
-            value, _ = _backward(systems[-1], value, weight, unit, rate)
-        for system in reversed(systems):
+            value, _ = _backward(systems[-1], value, weights[-1], unit, rate)
+        for system, weight in zip(reversed(systems), reversed(weights), strict=True):
             value, gain = _backward(system, value, weight, unit, rate)
             found.append(system.spreads @ gain)
         done = np.array(found[::-1])
@@ -158,6 +164,7 @@ class _System:
     inputs: Array  # B
     spreads: Array  # S, (jets + 6 + n, inputs)
     turning: Array  # I⁻¹ ∂hω/∂ṡ, (3, n)
+    free: float  # share of the weight that the feet do not carry, now or soon [1]
 
     @classmethod
     def at(cls, belief: Belief, plan: Reference, row: int, ahead: int, how: LookAhead, *, stands: bool) -> _System:
@@ -199,7 +206,7 @@ class _System:
             errors[18 + jets + index, 18 + index] = of_thrust
             errors[18 + jets + index, 18 + jets + index] = of_rate
             effect[18 + jets + index, index] = of_throttle
-            spreads[index, index] = how.throttle * max(free, 1e-3) * (jet.throttle_max - jet.throttle_min)
+            spreads[index, index] = how.throttle * (jet.throttle_max - jet.throttle_min)
         of_point = (
             np.hstack([np.vstack([np.eye(3), skew(point)]) for point in points]) if len(points) else np.zeros((6, 0))
         )
@@ -214,7 +221,7 @@ class _System:
             of_joints = of_joints - (turning @ counter) * of_joints.any(axis=0)
             effect[3:6, jets + 6 :], effect[9:12, jets + 6 :] = of_joints[:3] / units.mass, of_joints[3:]
             spreads[jets + 6 :, jets + 6 :] = how.joint * flying * np.eye(count)
-        return cls(errors=errors, inputs=effect @ spreads, spreads=spreads, turning=np.asarray(counter))
+        return cls(errors=errors, inputs=effect @ spreads, spreads=spreads, turning=np.asarray(counter), free=free)
 
 
 def _backward(system: _System, value: Array, weight: Array, scale: Array, rate: float) -> tuple[Array, Array]:
