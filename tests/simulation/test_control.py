@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 import multimodal_to as mt
+from drones import drone
 from multimodal_to.errors import InputError
 from multimodal_to.simulation import (
     Command,
     Disturbance,
     Draws,
     Push,
+    ServoController,
     ServoGains,
     Servos,
     WholeBodyController,
@@ -30,6 +32,7 @@ from multimodal_to.simulation.noise import Estimate, Noise
 from multimodal_to.simulation.reference import reference
 from multimodal_to.simulation.units import Units
 from multimodal_to.trajectory.resampling import resample
+from synthetic import take_off as synthetic_take_off
 
 pytest.importorskip("mujoco")
 
@@ -244,3 +247,40 @@ def test_an_estimate_drifts_in_the_air_and_stays_where_a_foot_stands(ironcub):
         errors[stands] = np.abs(seen).max()
     assert errors[True] == 0.0
     assert 1e-3 < errors[False] < 0.1
+
+
+def hovering(robot):
+    """A hover 1 m high for two seconds of a body whose jets carry it evenly."""
+    motion = synthetic_take_off(robot)
+    count, throttle = motion.time.size, [[jet.model.steady_throttle(0.5 * robot.weight)] for jet in robot.jets]
+    return replace(
+        motion,
+        base_position=np.tile([[0.0], [0.0], [1.0]], count),
+        base_quaternion_xyzw=np.tile([[0.0], [0.0], [0.0], [1.0]], count),
+        com_position=np.tile([[0.0], [0.0], [1.0]], count),
+        contact_forces=np.zeros_like(motion.contact_forces),
+        thrust=np.full_like(motion.thrust, 0.5 * robot.weight),
+        throttle=np.tile(throttle, count),
+    )
+
+
+@pytest.mark.parametrize("controller", [ServoController, WholeBodyController])
+def test_a_robot_without_joints_hovers_as_planned(tmp_path, controller):
+    pytest.importorskip("piqp")
+    robot = drone(tmp_path)
+    played = play(robot, part_of(hovering(robot), 0.0, 0.3), controller())
+    assert tracking(played).survived
+    assert tracking(played).com < 0.01
+    assert played.torques.shape[1] == 0
+
+
+def test_parallel_jets_on_the_body_lean_it_to_move_aside(tmp_path):
+    """A robot that hovers 2 cm too far to the left turns its thrust to the right: the left jet pushes more."""
+    robot = drone(tmp_path)
+    still = hovering(robot)
+    plan = reference(robot, still, np.arange(0.0, 1.0, 2e-3))
+    belief = Belief(robot, still)
+    feedback = Feedback(belief, plan, 2e-3, LookAhead())
+    left, right = advice(feedback, belief, plan, 0, place=np.array([0.0, 0.02, 0.0])).throttle
+    assert robot.jet_names == ("left", "right")
+    assert left > right + 0.1

@@ -465,8 +465,8 @@ def _quadratic(
     solver.settings.verbose = False
     solver.settings.eps_abs = solver.settings.eps_rel = ACCURACY
     solver.settings.max_iter = ITERATIONS
-    matrices = [np.asfortranarray(part) for part in (hessian, equal, rows)]
-    solver.setup(matrices[0], gradient, matrices[1], to, matrices[2], lower, upper)
+    bounds = (np.asfortranarray(rows), lower, upper) if len(rows) else (None, None, None)
+    solver.setup(np.asfortranarray(hessian), gradient, np.asfortranarray(equal), to, *bounds)
     status = solver.solve()
     if status not in (piqp.PIQP_SOLVED, piqp.PIQP_MAX_ITER_REACHED):
         return None
