@@ -392,6 +392,30 @@ def test_a_simulation_is_written_only_to_a_trajectory_file(file, tmp_path):
     assert "no trajectory file" in result.stderr
 
 
+def test_a_simulation_as_json_has_a_list_of_trials(file, tmp_path):
+    pytest.importorskip("mujoco")
+    result = run("simulate", file, "--json", "--output", tmp_path / "one.npz")
+    found = json.loads(result.stdout)
+    assert found["seed"] is None
+    assert [trial["draw"] for trial in found["trials"]] == [None]
+    assert {"survived", "com_error_max", "base_error_max", "torque_ratio_max", "touch_down_speed_max"} < set(
+        found["trials"][0]
+    )
+
+
+def test_trials_that_were_done_are_not_done_again(file, tmp_path):
+    pytest.importorskip("mujoco")
+    arguments = ("simulate", file, "--seed", "3", "--jobs", "1", "--output", tmp_path / "worst.npz")
+    first = run(*arguments, "--trials", "1")
+    assert "0 of 1 trials survive" in first.stdout
+    again = run(*arguments, "--trials", "2", "--json")
+    found = json.loads(again.stdout)
+    assert [trial["number"] for trial in found["trials"]] == [0, 1]
+    assert "trial   0" not in again.stderr
+    assert "trial   1" in again.stderr
+    assert again.returncode == 1
+
+
 @pytest.fixture(scope="module")
 def with_own_terms(ironcub, tmp_path_factory):
     """A file of a problem with terms that the command line does not have."""

@@ -15,7 +15,7 @@ import typer
 
 # They register their commands, in this order.
 # isort: off
-from multimodal_to.cli import solving, sweeping, showing, judging, robots  # noqa: F401
+from multimodal_to.cli import solving, sweeping, showing, judging, simulating, robots  # noqa: F401
 
 # isort: on
 from multimodal_to import ending

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import time
 from itertools import takewhile
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -22,12 +23,15 @@ from multimodal_to.cli.common import (
     writable_file,
 )
 from multimodal_to.cli.completion import exports, figures, flavours
-from multimodal_to.errors import InputError, OutputError, unknown
+from multimodal_to.errors import InputError, ModelError, OutputError, unknown
 from multimodal_to.exporting.export import EXPORTS, write_mujoco, write_pinocchio
 from multimodal_to.exporting.motion import FLAVOURS, write_motion
-from multimodal_to.models.robot import load_robot
+from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.conditions import under_conditions
+
+if TYPE_CHECKING:
+    from multimodal_to.reporting.report import Carried
 
 
 @app.command()
@@ -140,10 +144,15 @@ def replay(
 def report_file(
     file: File,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write. [FILE.html]")] = None,
+    playback: Annotated[
+        bool, typer.Option(help="Show what a controller makes of it in MuJoCo, where that is installed.")
+    ] = True,
     meshes: Annotated[bool, typer.Option(help="Draw meshes where the robot has them.")] = True,
     robot: RobotOption = "",
 ) -> None:
     """Write one page with replay, figures, audit and scenario of a trajectory; it opens from disk and prints.
+
+    The replay shows what the controller of `simulate` makes of the plan, and the plan faint beside it.
 
     Example: multimodal-to report results/take-off/trajectory.npz --output take-off.html
     """
@@ -152,7 +161,29 @@ def report_file(
     writable_file(target, ".html")
     from multimodal_to.reporting.report import write_report
 
-    out.print(f"wrote {write_report(the_robot, trajectory, target, meshes=meshes)}", soft_wrap=True)
+    carried = _carried(the_robot, trajectory) if playback else None
+    out.print(f"wrote {write_report(the_robot, trajectory, target, carried=carried, meshes=meshes)}", soft_wrap=True)
+
+
+def _carried(robot: Robot, plan: Trajectory) -> Carried | None:
+    """Return what a controller makes of a plan; None where there is no simulator, or it does not take the robot."""
+    from multimodal_to.reporting.report import Carried
+    from multimodal_to.simulation import run_trial, simulated_trajectory
+
+    try:
+        playback, trial = run_trial(robot, plan, None)
+    except (OutputError, ModelError) as error:
+        out.print(f"no playback: {error}", soft_wrap=True)
+        return None
+    errors = (
+        f"CoM at most {100 * trial.com_error_max:.1f} cm, base {math.degrees(trial.base_error_max):.1f}° off the plan"
+    )
+    end = f"The robot falls at {trial.fell:.2f} s" if trial.fell is not None else f"The robot {trial.end} at the end"
+    return Carried(
+        motion=simulated_trajectory(playback),
+        summary=f"Carried out in MuJoCo, undisturbed; the plan is faint. {end}; {errors}.",
+        fell=trial.fell,
+    )
 
 
 @app.command("export")

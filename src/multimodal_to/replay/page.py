@@ -7,10 +7,11 @@ import gzip
 import html
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from string import Template
+from types import MappingProxyType
 from typing import Any
 
 from multimodal_to.adam.spatial import Array
@@ -28,6 +29,7 @@ _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
 _FLAME = ("#f58a24", "flame: thrust of a jet")
 _ARROW = ("#1fa34a", "arrow: contact force")
 _COM = ("#2b6ce0", "sphere and line: centre of mass")
+_MARK = "#111111"
 _FLIGHT = ("#d62728", "bar above the time: flight")
 
 
@@ -38,6 +40,7 @@ def write_html(
     path: str | os.PathLike[str],
     *,
     ghost: Trajectory | None = None,
+    marks: Mapping[float, str] | None = None,
     meshes: bool = True,
 ) -> Path:
     """Write one page that plays the motion in a browser, from disk, with networking off; whole or not at all.
@@ -49,26 +52,35 @@ def write_html(
         trajectory: its motion.
         path: of the page.
         ghost: another motion of the same robot, drawn faint: the plan of a simulation, or the other way round.
+        marks: what happens when [s], such as a fall; each is marked above the time and named.
         meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
 
     Raises:
         InputError: the ghost is not one of the same robot.
         OutputError: the folder does not exist or cannot be written.
     """
-    return write_text(path, page(robot, trajectory, ghost=ghost, meshes=meshes))
+    return write_text(path, page(robot, trajectory, ghost=ghost, marks=marks, meshes=meshes))
 
 
 @checked
-def page(robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = None, meshes: bool = True) -> str:
+def page(
+    robot: Robot,
+    trajectory: Trajectory,
+    *,
+    ghost: Trajectory | None = None,
+    marks: Mapping[float, str] | None = None,
+    meshes: bool = True,
+) -> str:
     """Return the page that `write_html` writes.
 
     Args:
         robot: that moves.
         trajectory: its motion.
         ghost: another motion of the same robot, drawn faint in the same scene; it begins when this one does.
+        marks: what happens when [s], such as a fall; each is marked above the time and named.
         meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
     """
-    return _page(trajectory, player(robot, trajectory, ghost=ghost, meshes=meshes))
+    return _page(trajectory, player(robot, trajectory, ghost=ghost, marks=marks, meshes=meshes))
 
 
 @checked
@@ -108,18 +120,26 @@ def write_still_html(
 
 
 @checked
-def player(robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = None, meshes: bool = True) -> str:
+def player(
+    robot: Robot,
+    trajectory: Trajectory,
+    *,
+    ghost: Trajectory | None = None,
+    marks: Mapping[float, str] | None = None,
+    meshes: bool = True,
+) -> str:
     """Return the HTML that plays the motion, for a page that has one: a block as high as what it stands in.
 
     Args:
         robot: that moves.
         trajectory: its motion.
         ghost: another motion of the same robot, drawn faint in the same scene; it begins when this one does.
+        marks: what happens when [s], such as a fall; each is marked above the time and named.
         meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
     """
     recorder, look = Recorder(), appearance(robot.urdf, meshes=meshes)
     picture = draw_motion(meshcat.Visualizer(window=recorder), robot, trajectory, look, ghost=ghost)
-    return _player(robot, trajectory, recorder, picture, look.attribution, ghost)
+    return _player(robot, trajectory, recorder, picture, look.attribution, ghost, marks or {})
 
 
 def _page(trajectory: Trajectory, content: str) -> str:
@@ -133,6 +153,7 @@ def _player(
     picture: Picture,
     attribution: str,
     ghost: Trajectory | None = None,
+    marks: Mapping[float, str] = MappingProxyType({}),
 ) -> str:
     phases = [] if picture.still or not trajectory.contact_names else flight_phases(robot, trajectory)
     shown = {_FLAME: trajectory.jet_names, _ARROW: trajectory.contact_names, _COM: not picture.still, _FLIGHT: phases}
@@ -144,11 +165,17 @@ def _player(
     if ghost is not None:
         text = f"faint, and its line: {html.escape(ghost.scenario)}"
         keys.append(f'<div><span class="key" style="background: #{GHOST_COLOUR:06x}"></span>{text}</div>')
+    keys += [
+        f'<div><span class="key" style="background: {_MARK}"></span>{html.escape(text)} at {time:.2f} s</div>'
+        for time, text in marks.items()
+    ]
+    bands = [_band(trajectory, *phase) for phase in phases]
+    bands += [_tick(trajectory, time, text) for time, text in marks.items()]
     return _template("player.html").substitute(
         title=_title(trajectory),
         legend="".join(keys),
         credit=f'<div class="panel credit">{html.escape(attribution)}</div>' if attribution else "",
-        bands="".join(_band(trajectory, *phase) for phase in phases),
+        bands="".join(bands),
         duration=f"{trajectory.duration:.6f}",
         packed=_packed([_VIEWER.read_bytes(), *recorder.commands]),
         scene=_json(_content(trajectory, recorder, picture)),
@@ -181,6 +208,11 @@ def _title(trajectory: Trajectory) -> str:
 def _band(trajectory: Trajectory, start: float, end: float) -> str:
     left, width = ((instant / trajectory.duration) for instant in (start - trajectory.time[0], end - start))
     return f'<span class="band" style="left: {100 * left:.3f}%; width: {100 * width:.3f}%" title="flight"></span>'
+
+
+def _tick(trajectory: Trajectory, time: float, text: str) -> str:
+    left, what = 100 * (time - trajectory.time[0]) / trajectory.duration, html.escape(text)
+    return f'<span class="tick" style="left: {left:.3f}%; background: {_MARK}" title="{what}"></span>'
 
 
 def _json(content: Any) -> str:

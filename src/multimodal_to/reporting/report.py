@@ -8,6 +8,7 @@ import io
 import os
 import platform
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from importlib import metadata, resources
 from pathlib import Path
 from string import Template
@@ -43,14 +44,31 @@ _CAPTIONS: Mapping[str, str] = {
 }
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Carried:
+    """What a controller made of a plan in a simulation."""
+
+    motion: Trajectory  # what happened, on the plan's knots
+    summary: str  # how it ended, a sentence
+    fell: float | None = None  # when [s]
+
+
 @checked
-def write_report(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[str], *, meshes: bool = True) -> Path:
+def write_report(
+    robot: Robot,
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    *,
+    carried: Carried | None = None,
+    meshes: bool = True,
+) -> Path:
     """Write the report of a motion as one page that opens from disk; whole or not at all.
 
     Args:
         robot: that moves.
         trajectory: its motion, with the scenario and the record of its solve where it keeps them.
         path: of the page.
+        carried: what a controller made of the motion, which is then drawn with the motion faint beside it.
         meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
 
     Raises:
@@ -68,7 +86,16 @@ def write_report(robot: Robot, trajectory: Trajectory, path: str | os.PathLike[s
             summary=_summary(report),
             facts="".join(_row(("th", name), ("td", text)) for name, text in _facts(robot, trajectory, report).items()),
             solve=_solve(trajectory),
-            player=player(robot, trajectory, meshes=meshes),
+            playback="" if carried is None else f"<p>{html.escape(carried.summary)}</p>",
+            player=player(robot, trajectory, meshes=meshes)
+            if carried is None
+            else player(
+                robot,
+                carried.motion,
+                ghost=trajectory,
+                marks={} if carried.fell is None else {trajectory.time[0] + carried.fell: "it fell"},
+                meshes=meshes,
+            ),
             figures="\n".join(_figure(name, robot, trajectory, report) for name in FIGURES),
             findings="\n".join(_findings(report.findings)),
             scenario=_scenario(scenario),

@@ -2,39 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from multimodal_to.arguments import check_fields, checked, vector
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, TrajectoryError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
-from multimodal_to.scenarios.scenario import Vector3
+from multimodal_to.simulation.controller import Controller
+from multimodal_to.simulation.disturbance import Disturbance, Push
 from multimodal_to.simulation.model import TIME_STEP
-from multimodal_to.simulation.playback import Playback, Player, stage
+from multimodal_to.simulation.playback import Playback, Player
 from multimodal_to.simulation.reference import reference
+from multimodal_to.simulation.servos import ServoController
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.sameness import refuse_other_robot
-
-
-@dataclass(frozen=True, kw_only=True)
-class Push:
-    """A constant force on the base link, at its CoM.
-
-    Raises:
-        InputError: it lasts for no time, or a number is not finite.
-    """
-
-    force: Vector3  # in world axes [N]
-    start: float  # since the simulation's start [s]
-    duration: float  # [s]
-
-    def __post_init__(self) -> None:
-        check_fields(self, what="the push's ")
-        vector("the push's force", self.force, 3)
-        if not (np.isfinite([*self.force, self.start, self.duration]).all() and self.duration > 0.0):
-            raise InputError(f"the push is {self}; expected finite numbers and a duration above zero")
 
 
 class Flight:
@@ -43,6 +24,7 @@ class Flight:
     Args:
         robot: that moves.
         plan: its motion, at whose first knot the simulation starts and which it follows until there is another one.
+        controller: what carries the plans out; by default the `WholeBodyController`.
         push: what pushes the robot, if anything does.
         torque_limits: clip the torque of each joint's motor at its effort limit.
 
@@ -52,17 +34,26 @@ class Flight:
     """
 
     @checked
-    def __init__(self, robot: Robot, plan: Trajectory, *, push: Push | None = None, torque_limits: bool = True) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        plan: Trajectory,
+        controller: Controller | None = None,
+        *,
+        push: Push | None = None,
+        torque_limits: bool = True,
+    ) -> None:
         refuse_other_robot(plan, robot, what="the plan", error=TrajectoryError)
-        simulation, friction = stage(robot, plan, torque_limits)
-        self._robot, self._push = robot, push
-        self._player = Player(simulation, plan, friction, torque_limits=torque_limits)
+        self._robot = robot
+        self._player = Player(
+            robot, plan, controller or ServoController(), Disturbance(push=push), torque_limits=torque_limits
+        )
         self._plan, self._since = plan, 0.0
 
     @property
     def time(self) -> float:
         """Return how much time has been simulated [s]."""
-        return TIME_STEP * self._player.steps
+        return self._player.time
 
     @property
     def fell(self) -> float | None:
@@ -92,6 +83,7 @@ class Flight:
         """
         refuse_other_robot(plan, self._robot, what="the plan", error=TrajectoryError)
         self._plan, self._since = plan, since
+        self._player.follow(plan, since)
 
     @checked
     def advance(self, duration: float) -> None:
@@ -105,8 +97,4 @@ class Flight:
         times = self.time + TIME_STEP * np.arange(round(duration / TIME_STEP), dtype=np.float64)
         if not times.size:
             return
-        force = None
-        if self._push is not None:
-            pushed = (times >= self._push.start - 1e-9) & (times < self._push.start + self._push.duration - 1e-9)
-            force = pushed[:, None] * np.array(self._push.force)
-        self._player.run(reference(self._robot, self._plan, times - self._since), force)
+        self._player.run(reference(self._robot, self._plan, times - self._since))

@@ -29,10 +29,6 @@ TIME_STEP = 1e-3  # [s]
 POINT_RADIUS = 2e-3  # of the sphere at a contact point [m]
 CONTACT_TIME = 5e-3
 """Time constant of a contact, critically damped [s]: the softest part of the model."""
-STIFFNESS = 300.0
-"""K of each joint's servo, τ = K (target − s) − D ṡ, within the effort limit of the joint [N m/rad]."""
-DAMPING = 10.0
-"""D of each joint's servo [N m s/rad]; MuJoCo integrates it implicitly."""
 COUPLING_TIME = 2.0 * TIME_STEP
 """Time constant of what holds a follower to its leader, critically damped [s]: the shortest that a step allows."""
 COUPLING_STRENGTH = 0.9999
@@ -62,8 +58,8 @@ class SimulationModel:
     """A compiled model with where its numbers stand.
 
     MuJoCo's qpos is (p, quaternion w x y z, joints), its qvel (ṗ in world axes, ω in the base's axes, joint
-    velocities), with the joints in an order of its own. Its ctrl is in the robot's order: where each joint's servo
-    wants it [rad or m], then the thrusts [N].
+    velocities), with the joints in an order of its own. Its ctrl is in the robot's order: the torque of each joint's
+    motor [N m or N] without what its servo adds, then the thrusts [N].
     """
 
     robot: Robot
@@ -103,6 +99,16 @@ class SimulationModel:
         data.qvel[:3], data.qvel[3:6] = velocity[:3], turn.reshape(3, 3).T @ velocity[3:]
         data.qvel[6:] = (self.coupling @ joint_velocities)[6:]
 
+    def set_servos(self, stiffness: Array, damping: Array) -> None:
+        """Let each joint's motor add −K s − D ṡ to its control; MuJoCo integrates the damping implicitly.
+
+        Args:
+            stiffness: K [N m/rad or N/m], (n,).
+            damping: D [N m s/rad or N s/m], (n,).
+        """
+        count = len(self.robot.joint_names)
+        self.model.actuator_biasprm[:count, 1], self.model.actuator_biasprm[:count, 2] = -stiffness, -damping
+
     def _moving(self, values: Mapping[str, Array]) -> dict[str, Array]:
         tree = self.robot.kindyn.tree
         return {name: values[name] for name in (*tree.joint_names, *tree.followers)}
@@ -126,7 +132,7 @@ def build_model(
         friction: Coulomb's μ, a round cone; the robot's own by default.
         middle: of the ground that is built where it is no plane [m], (2,); the world's origin by default.
         reach: how far that goes to each side [m].
-        torque_limits: clip what the servo of a joint gives at the joint's effort limit.
+        torque_limits: clip what the motor of a joint gives at the joint's effort limit.
 
     Raises:
         InputError: the friction, the reach or the middle is no number that the ground can have.
@@ -153,7 +159,7 @@ def build_model(
     _add_couplings(mujoco, spec, robot)
     mu = robot.friction if friction is None else friction
     for name in robot.contact_names:
-        spec.body(_body_name(robot, name)).add_geom(
+        spec.body(body_name(robot, name)).add_geom(
             name=name,
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
             size=[POINT_RADIUS, 0.0, 0.0],
@@ -224,7 +230,7 @@ def _add_bodies(mujoco: ModuleType, spec: Any, robot: Robot) -> tuple[str, ...]:
     of_link: dict[str, list[tuple[str, FixedFrame]]] = {}
     for frame, fixed in robot.added_frames.items():
         of_link.setdefault(fixed.link, []).append((frame, fixed))
-    base = spec.worldbody.add_body(name=_body_name(robot, tree.base))
+    base = spec.worldbody.add_body(name=body_name(robot, tree.base))
     base.add_freejoint()
     pending = [(tree.base, base)]
     while pending:
@@ -232,11 +238,11 @@ def _add_bodies(mujoco: ModuleType, spec: Any, robot: Robot) -> tuple[str, ...]:
         _set_inertia(body, by_name[name])
         for frame, added in of_link.get(name, ()):
             body.add_body(
-                name=_body_name(robot, frame), pos=added.translation, quat=_quaternion(mujoco, added.rotation)
+                name=body_name(robot, frame), pos=added.translation, quat=_quaternion(mujoco, added.rotation)
             ).explicitinertial = True
         for joint in reversed(below.get(name, [])):
             child = body.add_body(
-                name=_body_name(robot, joint.child), pos=joint.translation, quat=_quaternion(mujoco, joint.rotation)
+                name=body_name(robot, joint.child), pos=joint.translation, quat=_quaternion(mujoco, joint.rotation)
             )
             if joint.name in tree.joint_names or joint.name in tree.followers:
                 kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
@@ -332,7 +338,7 @@ def _hold(mujoco: ModuleType, body: Any, joint: Joint, value: float) -> None:
     body.quat = turned
 
 
-def _body_name(robot: Robot, link: str) -> str:
+def body_name(robot: Robot, link: str) -> str:
     """Return what the body of a link is called: as the link, or otherwise where MuJoCo's own world is called so."""
     return _free(link, robot.kindyn.frame_names) if link == "world" else link
 
@@ -395,13 +401,13 @@ def _add_ground(
 
 
 def _add_actuators(mujoco: ModuleType, spec: Any, robot: Robot, limits: Array | None) -> None:
-    """Add a servo at each joint, and at each jet a force along −z of a site that is the jet's frame.
+    """Add a motor at each joint, and at each jet a force along −z of a site that is the jet's frame.
 
     Args:
         mujoco: the package.
         spec: the model that is being made.
         robot: with joints and jets.
-        limits: largest torque of each servo, infinite where it has no limit [N m or N], (n,); None limits none.
+        limits: largest torque of each motor, infinite where it has no limit [N m or N], (n,); None limits none.
     """
     for index, name in enumerate(robot.joint_names):
         limit = np.inf if limits is None else float(limits[index])
@@ -410,14 +416,12 @@ def _add_actuators(mujoco: ModuleType, spec: Any, robot: Robot, limits: Array | 
             name=name,
             trntype=mujoco.mjtTrn.mjTRN_JOINT,
             target=name,
-            gainprm=[STIFFNESS] + 9 * [0.0],
-            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-            biasprm=[0.0, -STIFFNESS, -DAMPING] + 7 * [0.0],
+            biastype=mujoco.mjtBias.mjBIAS_AFFINE,  # `set_servos` says how
             forcelimited=limited,
             forcerange=[-limit, limit] if limited else [0.0, 0.0],
         )
     for jet in robot.jets:
-        spec.body(_body_name(robot, jet.frame)).add_site(name=jet.name)
+        spec.body(body_name(robot, jet.frame)).add_site(name=jet.name)
         spec.add_actuator(
             name=_free(jet.name, robot.joint_names),
             trntype=mujoco.mjtTrn.mjTRN_SITE,

@@ -59,6 +59,8 @@ class Tracking:
     end: str  # "fell", "stands", "hovers" or "in the air"
     com_at_end: float  # [m]
     attitude_at_end: float  # [°]
+    survived: bool  # it ended as the plan does: on its feet or in a hover
+    touch_down_speed: float  # largest of a contact point downwards as its foot comes down [m/s]; 0 where none does
 
     @property
     def torque_over_effort(self) -> float:
@@ -99,7 +101,9 @@ def tracking(playback: Playback) -> Tracking:
         torques=_joint_torques(playback),
         clipped=playback.torque_limits,
         fell=playback.fell,
-        end=_end(playback),
+        end=(end := _end(playback)),
+        survived=end == _planned_end(plan, robot),
+        touch_down_speed=_touch_down_speed(playback),
         com_at_end=float(com[-1]),
         attitude_at_end=float(attitude[-1]),
     )
@@ -123,9 +127,7 @@ def _worst_joint(robot: Robot, errors: Array, *, sliding: bool) -> tuple[float, 
 def _joint_torques(playback: Playback) -> tuple[JointTorque, ...]:
     """Return what was asked of every joint that has an effort limit; rows after a fall repeat and don't count."""
     limits = playback.robot.joint_limits.effort
-    steps = playback.time.size
-    if playback.fell is not None:
-        steps = int(np.searchsorted(playback.time, playback.fell, side="right"))
+    steps = _steps(playback)
     shares = np.abs(playback.asked_torques[:steps]) / limits
     found = [
         JointTorque(
@@ -147,6 +149,33 @@ def _end(playback: Playback) -> str:
     if last > loaded_force(playback.robot):
         return "stands"
     return "hovers" if np.linalg.norm(playback.qvel[-1, :3]) < 0.2 else "in the air"
+
+
+def _planned_end(plan: Trajectory, robot: Robot) -> str:
+    return "stands" if float(plan.vertical_contact_force()[-1]) > loaded_force(robot) else "hovers"
+
+
+def _touch_down_speed(playback: Playback) -> float:
+    """Return the largest speed downwards of a contact point just before its foot comes down [m/s]."""
+    up, count = playback.robot.up, _steps(playback)
+    heights = playback.points[:count] @ up
+    speeds, fastest = -np.diff(heights, axis=0, prepend=heights[:1]) / TIME_STEP, 0.0
+    for members in playback.robot.feet.values():
+        own = list(members)
+        forces = np.linalg.norm(playback.contact_forces[:count, own].sum(axis=1), axis=1)
+        touches = forces > loaded_force(playback.robot)
+        for first in np.flatnonzero(touches[1:] & ~touches[:-1]) + 1:
+            blink = int(first - BLINK / TIME_STEP)
+            if blink >= 0 and not touches[blink:first].any():
+                fastest = max(fastest, float(speeds[blink:first, own][-5:].max()))
+    return fastest
+
+
+def _steps(playback: Playback) -> int:
+    """Return how many rows there are until the end or a fall, after which they repeat."""
+    if playback.fell is None:
+        return int(playback.time.size)
+    return int(np.searchsorted(playback.time, playback.fell, side="right"))
 
 
 def _rotations(qpos: Array) -> Array:

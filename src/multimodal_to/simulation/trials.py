@@ -1,0 +1,182 @@
+"""Disturbed playbacks of one plan: each is drawn from a seed, so that anyone can run it again."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from multimodal_to.errors import InputError
+from multimodal_to.models.robot import Robot
+from multimodal_to.simulation.controller import Controller, drawn
+from multimodal_to.simulation.disturbance import GAIN_SPREAD, Disturbance, draw
+from multimodal_to.simulation.playback import Playback, play
+from multimodal_to.simulation.report import tracking
+from multimodal_to.simulation.servos import ServoController, ServoGains
+from multimodal_to.simulation.whole_body import WholeBodyController, WholeBodyGains
+from multimodal_to.trajectory import Trajectory
+from multimodal_to.values import FrozenMapping
+
+Make = Callable[[np.random.Generator | None], Controller]
+"""What makes the controller of a trial: with gains drawn from the generator; without one, as they are."""
+
+
+def servos(rng: np.random.Generator | None = None) -> Controller:
+    """Return the `ServoController`; with a generator its gains are each drawn within ±20 %."""
+    return ServoController(ServoGains() if rng is None else drawn(ServoGains(), rng, GAIN_SPREAD))
+
+
+def whole_body(rng: np.random.Generator | None = None) -> Controller:
+    """Return the `WholeBodyController`; with a generator its gains are each drawn within ±20 %."""
+    return WholeBodyController(WholeBodyGains() if rng is None else drawn(WholeBodyGains(), rng, GAIN_SPREAD))
+
+
+CONTROLLERS: Mapping[str, Make] = FrozenMapping({"servos": servos, "whole-body": whole_body})
+"""The controllers of this library by name; the first one is what `play` and `simulate` use."""
+default_controller: Make = servos
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """What came of a playback; the errors of one that fell are those until it fell."""
+
+    number: int  # of the trial, from 0
+    survived: bool  # it stands or hovers at the end, as the plan does
+    end: str  # "fell", "stands", "hovers" or "in the air"
+    fell: float | None  # when [s]
+    com_error_max: float  # [m]
+    base_error_max: float  # [rad]
+    torque_ratio_max: float  # largest torque that was asked of a motor over its effort limit [1]
+    touch_down_speed_max: float  # of a contact point, downwards [m/s]; 0 where no foot came down
+    control_time: float  # that a command took, in the mean [s]
+    draw: Mapping[str, Any] | None  # what was changed of the robot; None: nothing
+
+
+def _data(disturbance: Disturbance) -> dict[str, Any]:
+    """Return a disturbance as what JSON can hold."""
+    return {
+        "masses": dict(disturbance.masses),
+        "motor_gains": dict(disturbance.motor_gains),
+        "friction": disturbance.friction,
+        "delay": disturbance.delay,
+        "push": None if disturbance.push is None else asdict(disturbance.push),
+        "noise": None if disturbance.noise is None else asdict(disturbance.noise),
+    }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Draws:
+    """How trials are drawn.
+
+    Raises:
+        InputError: a number is below zero or not finite.
+    """
+
+    seed: int = 1
+    push: float | None = None  # force of the push [N]; 0.114 of the weight by default
+    noise: bool = False  # sensors with noise and an estimate that drifts
+
+    def __post_init__(self) -> None:
+        if self.seed < 0 or not (self.push is None or 0.0 <= self.push < np.inf):
+            raise InputError(f"the draws are {self}; expected a seed and a push of at least zero")
+
+
+def run_trial(
+    robot: Robot,
+    plan: Trajectory,
+    number: int | None,
+    draws: Draws | None = None,
+    *,
+    make: Make = default_controller,
+    torque_limits: bool = True,
+) -> tuple[Playback, Trial]:
+    """Play a plan back once and return what happened and what came of it.
+
+    Args:
+        robot: that moves.
+        plan: its motion.
+        number: of the trial; it and the seed say how it is disturbed. None disturbs nothing.
+        draws: how trials are drawn.
+        make: the controller.
+        torque_limits: clip the torque of each joint's motor at its effort limit.
+    """
+    draws, rng, disturbance = draws or Draws(), None, None
+    if number is not None:
+        rng = np.random.default_rng([draws.seed, number])
+        disturbance = draw(robot, plan.duration, rng, push=draws.push, noise=draws.noise)
+    controller = make(rng)
+    playback = play(robot, plan, controller, disturbance=disturbance, torque_limits=torque_limits)
+    return playback, _trial(playback, number or 0, disturbance)
+
+
+def _trial(playback: Playback, number: int, disturbance: Disturbance | None) -> Trial:
+    outcome = tracking(playback)
+    return Trial(
+        number=number,
+        survived=outcome.survived,
+        end=outcome.end,
+        fell=outcome.fell,
+        com_error_max=outcome.com,
+        base_error_max=float(np.radians(outcome.attitude)),
+        torque_ratio_max=outcome.torque_over_effort,
+        touch_down_speed_max=outcome.touch_down_speed,
+        control_time=playback.control_time,
+        draw=None if disturbance is None else _data(disturbance),
+    )
+
+
+def run_trials(
+    robot: Robot,
+    plan: Trajectory,
+    numbers: Sequence[int],
+    draws: Draws | None = None,
+    *,
+    make: Make = default_controller,
+    torque_limits: bool = True,
+    jobs: int = 1,
+) -> Iterator[Trial]:
+    """Yield disturbed playbacks as they end.
+
+    Args:
+        robot: that moves.
+        plan: its motion.
+        numbers: of the trials.
+        draws: how they are drawn.
+        make: the controller; a function that other processes can import if there are several.
+        torque_limits: clip the torque of each joint's motor at its effort limit.
+        jobs: how many run at once, each in a process of its own.
+    """
+    if jobs <= 1 or len(numbers) <= 1:
+        for number in numbers:
+            yield run_trial(robot, plan, number, draws, make=make, torque_limits=torque_limits)[1]
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(max_workers=min(jobs, len(numbers)), mp_context=context) as pool:
+        waiting = [pool.submit(_alone, robot, plan, number, draws, make, torque_limits) for number in numbers]
+        try:
+            for done in as_completed(waiting):
+                yield done.result()
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def gains_alone(robot: Robot, plan: Trajectory, number: int, seed: int, *, make: Make = default_controller) -> Trial:
+    """Play a plan back once with other gains of the controller, and nothing else disturbed.
+
+    Args:
+        robot: that moves.
+        plan: its motion.
+        number: of the playback; it and the seed say which gains.
+        seed: of all of them.
+        make: the controller.
+    """
+    playback = play(robot, plan, make(np.random.default_rng([seed, number])))
+    return _trial(playback, number, None)
+
+
+def _alone(robot: Robot, plan: Trajectory, number: int, draws: Draws | None, make: Make, torque_limits: bool) -> Trial:
+    return run_trial(robot, plan, number, draws, make=make, torque_limits=torque_limits)[1]

@@ -1,0 +1,474 @@
+"""The whole-body controller: a quadratic program, 500 times a second, for accelerations and contact forces.
+
+With ν̇ the accelerations of base and joints, f the forces at the contact points and T the thrusts as they are,
+
+    min Σ_i w_i ‖A_i ν̇ − a_i‖² + w_f ‖f − f*‖²   subject to   M ν̇ + h = Jᵀ f + J_Tᵀ T + τ,
+
+with f within the friction cones and the torques τ, which act on the joints alone, within the effort limits. The tasks i
+are the momentum's rate, the base's attitude, the feet and the posture; each a_i is that of the plan and a feedback.
+
+Forces are allowed at all points of a foot that the plan loads and that is near the ground, and not only where it
+touches: else a foot that comes down on its heel stays there. Throttles come from `look_ahead`, and with them what the
+joints between base and jets add to their posture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import ModuleType
+
+import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
+
+from multimodal_to.adam.spatial import Array
+from multimodal_to.errors import OutputError
+from multimodal_to.models.robot import Robot
+from multimodal_to.models.state import State
+from multimodal_to.models.terrain import FlatGround, frame_function
+from multimodal_to.scenarios.data import stored
+from multimodal_to.simulation.controller import Belief, Command, Servos, row_of
+from multimodal_to.simulation.feet import PlannedFeet
+from multimodal_to.simulation.look_ahead import Feedback, LookAhead
+from multimodal_to.simulation.model import mujoco_module
+from multimodal_to.simulation.reference import Reference, reference
+from multimodal_to.simulation.stabiliser import rotation_vector, skew
+from multimodal_to.simulation.turbines import around
+from multimodal_to.simulation.units import Units
+from multimodal_to.trajectory import Trajectory
+
+PERIOD = 2e-3  # between two commands [s]
+NEAR = 3.5e-3
+"""A foot that the plan loads may push while it is nearer to the ground than this [L]: 2 mm of the iRonCub."""
+STUCK = 0.02  # how long a foot counts as near after it was so [s]
+SOON = 0.25  # how long before it is loaded a foot that is near counts as standing [s]
+LOADED = 0.01  # a foot with more planned load than this stands [m g]
+DOWN = 0.0126  # how fast a foot goes on down that should stand already [√(g L)]
+SIDES = 8  # of the pyramid within a friction cone
+FRICTION_SHARE = 0.97  # of the friction coefficient that is used [1]
+ACCURACY, ITERATIONS = 1e-5, 60  # of the program's solution, in the robot's own units [1]
+JOINT_LAG = 0.03  # with which joints take over the wish of the look-ahead [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class WholeBodyGains:
+    """The feedback of the whole-body controller, in the robot's own units: m, g and L, its CoM's height at home."""
+
+    com: float = 0.95  # level CoM [g/L]
+    com_rate: float = 1.95  # [√(g/L)]
+    height: float = 3.5  # CoM along gravity [g/L]
+    height_rate: float = 3.7  # [√(g/L)]
+    spin_rate: float = 1.2  # angular momentum [√(g/L)]
+    base: float = 1.15  # attitude of the base [g/L]
+    base_rate: float = 1.87  # [√(g/L)]
+    foot: float = 17.6  # of a foot that swings [g/L]
+    foot_rate: float = 8.5  # [√(g/L)]
+    stance_rate: float = 3.7  # of a foot that stands [√(g/L)]
+    joint: float = 53.0  # posture [g/L]
+    joint_rate: float = 14.6  # [√(g/L)]
+    stiffness: float = 0.35  # K of each joint's servo [m g L/rad]
+    damping: float = 0.052  # D of each joint's servo [m g L √(L/g)/rad]
+    look_ahead: LookAhead = field(default_factory=LookAhead)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weights:
+    """How much the square of an error of the robot's own units counts: g, g/L, m g or m g L."""
+
+    com: float = 7.1
+    spin: float = 26.0  # of the angular momentum's rate
+    base: float = 4.5
+    base_in_flight: float = 0.006
+    stance: float = 147.0  # of feet that stand
+    foot: float = 4.3  # of feet that swing
+    foot_soon: float = 0.1  # in flight, of a foot that comes down soon
+    legs: float = 0.0013  # posture of the joints that carry feet, while one stands
+    others: float = 0.75  # posture of the other joints
+    flying: float = 0.9  # posture in flight
+    force: float = 0.31  # of contact forces away from the plan's
+    torque: float = 0.004
+
+
+def solver_module() -> ModuleType:
+    """Return the package `piqp`.
+
+    Raises:
+        OutputError: it is not installed.
+    """
+    try:
+        import piqp
+    except ImportError as error:
+        raise OutputError("the whole-body controller needs piqp: pip install 'multimodal-to[sim]'") from error
+    return piqp  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Task:
+    """w ‖A ν̇ − a‖², a weight for each row."""
+
+    matrix: Array  # A, (rows, 6 + n)
+    wanted: Array  # a, (rows,)
+    weight: Array  # w, (rows,)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Contacts:
+    """The points that may push."""
+
+    points: list[int]  # of the robot's contact points
+    jacobian: Array  # (3 points, 6 + n)
+    cones: Array  # rows of what is at most zero, (rows, 3 points)
+
+
+class WholeBodyController:
+    """A quadratic program for accelerations and contact forces, on top of soft joint servos.
+
+    Args:
+        gains: its feedback.
+        weights: how much each task counts.
+    """
+
+    def __init__(self, gains: WholeBodyGains | None = None, weights: Weights | None = None) -> None:
+        self._gains, self._weights = gains or WholeBodyGains(), weights or Weights()
+        self._since = 0.0
+        self._robot: Robot | None = None
+        self._belief: Belief
+        self._plan: Reference
+        self._feet: PlannedFeet
+        self._feedback: Feedback
+        self._units: Units
+        self._ground: cs.Function | None
+        self._legs: NDArray[np.bool_]
+        self._servo: tuple[Array, Array]
+        self._shift: Array
+        self._near: Array
+        self._torques: Array
+
+    @property
+    def period(self) -> float:
+        """Return the time between two commands [s]."""
+        return PERIOD
+
+    def reset(self, robot: Robot, plan: Trajectory, since: float) -> None:
+        """Follow a plan from now on; what the joints have been shifted by stays.
+
+        Args:
+            robot: that moves.
+            plan: its motion.
+            since: when the plan's first knot is or was, since the simulation's start [s].
+        """
+        first, self._robot, self._since = self._robot is None, robot, since
+        self._units, self._belief = Units.of(robot), Belief(robot, plan)
+        self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
+        self._feet = PlannedFeet.along(self._belief, self._plan, PERIOD)
+        self._feedback = Feedback(self._belief, self._plan, PERIOD, self._gains.look_ahead)
+        scenario = stored(plan)
+        surface = FlatGround() if scenario is None else scenario.surface
+        self._ground = frame_function(surface).map(len(robot.contacts)) if robot.contacts else None
+        self._legs = self._joints_of_feet()
+        count, units = len(robot.joint_names), self._units
+        self._servo = (
+            np.full(count, self._gains.stiffness * units.moment),
+            np.full(count, self._gains.damping * units.moment / units.frequency),
+        )
+        if first:
+            self._shift, self._torques = np.zeros(count), np.zeros(count)
+            self._near = np.full(len(robot.feet), -np.inf)  # when each foot was near the ground last [s]
+
+    def _joints_of_feet(self) -> NDArray[np.bool_]:
+        """Return which joints are between the base and a foot, (n,)."""
+        simulation, found = self._belief.simulation, np.zeros(self._belief.of_joints.shape[1] - 6, dtype=bool)
+        self._belief.put_plan(self._plan, 0)
+        mujoco_module().mj_fwdPosition(simulation.model, self._belief.data)
+        for own, body in zip(self._feet.members, self._feet.bodies, strict=True):
+            middle = self._belief.data.geom_xpos[simulation.points[own]].mean(axis=0)
+            found |= np.abs(self._jacobian(middle, body)[:, 6:]).max(axis=0) > 1e-9
+        return found
+
+    def command(self, state: State, time: float) -> Command:
+        """Return what the robot shall do.
+
+        Args:
+            state: as it was measured.
+            time: since the simulation's start [s].
+        """
+        assert self._robot is not None
+        self._belief.put(state)
+        plan, step = self._plan, row_of(time - self._since, PERIOD, self._plan)
+        advice = self._feedback.advise(state, step)
+        self._shift = self._shift + (advice.joints - self._shift) * PERIOD / JOINT_LAG
+        self._torques = self._solve(state, step, time, advice.errors)
+        servos = Servos(
+            positions=plan.joints[step] + self._shift,
+            velocities=plan.joint_velocities[step],
+            stiffness=self._servo[0],
+            damping=self._servo[1],
+        )
+        return Command(
+            torques=self._torques, throttle=around(self._robot.jets, plan, step, advice.throttle), servos=servos
+        )
+
+    def _solve(self, state: State, step: int, time: float, errors: Array) -> Array:
+        """Return the torques of the joints [N m or N], (n,).
+
+        Args:
+            state: as it was measured.
+            step: row of the plan.
+            time: since the simulation's start [s].
+            errors: of the momentum and what follows from it.
+        """
+        mass, bias = self._belief.mass_matrix(), self._belief.of_joints.T @ self._belief.data.qfrc_bias
+        feet, contacts = self._feet_and_contacts(step, time)
+        stands = bool(contacts.points)
+        tasks = [
+            *feet,
+            *self._momentum(mass, bias, step, errors),
+            self._attitude(step, stands),
+            self._posture(state, step, stands),
+        ]
+        return self._least(tasks, contacts, mass, bias - self._of_thrusts(state), step)
+
+    def _jacobian(self, point: Array, body: int) -> Array:
+        """Return that of a body's point and its turning, in (ṗ, ω in the base's axes, ṡ), (6, 6 + n)."""
+        model = self._belief.simulation.model
+        both = np.zeros((6, model.nv))
+        mujoco_module().mj_jac(model, self._belief.data, both[:3], both[3:], point, body)
+        return np.asarray(both @ self._belief.of_joints)
+
+    def _of_thrusts(self, state: State) -> Array:
+        """Return J_Tᵀ T, (6 + n,)."""
+        simulation, data = self._belief.simulation, self._belief.data
+        jacobian, turning = np.zeros((3, simulation.model.nv)), np.zeros((3, simulation.model.nv))
+        total = np.zeros(simulation.model.nv)
+        for site, jet, thrust in zip(simulation.jets, self._robot.jets, state.thrust, strict=True):
+            mujoco_module().mj_jacSite(simulation.model, data, jacobian, turning, site)
+            total -= thrust * (data.site_xmat[site].reshape(3, 3)[:, 2] @ (jacobian + jet.drag * turning))
+        return np.asarray(total @ self._belief.of_joints)
+
+    def _feet_and_contacts(self, step: int, time: float) -> tuple[list[_Task], _Contacts]:
+        """Return the tasks of the feet and which points may push."""
+        simulation, data, feet, units = self._belief.simulation, self._belief.data, self._feet, self._units
+        standing, swinging = list[_Task](), list[tuple[Array, Array, bool]]()
+        points, jacobians, cones = list[int](), list[Array](), list[Array]()
+        if self._ground is None:
+            return [], self._contacts(points, jacobians, cones)
+        positions = data.geom_xpos[simulation.points]
+        heights, normals, tangents = (np.array(part) for part in self._ground(positions.T))
+        until = min(step + round(SOON / PERIOD), feet.load.shape[1] - 1)
+        for foot, (own, body) in enumerate(zip(feet.members, feet.bodies, strict=True)):
+            loaded = feet.load[foot, step] > LOADED * units.force
+            soon = bool((feet.load[foot, step : until + 1] > LOADED * units.force).any())
+            lowest = float(heights[0, own].min())
+            if lowest < 0.2 * NEAR * units.length:
+                self._near[foot] = time
+            close = lowest < NEAR * units.length or time - self._near[foot] < STUCK
+            jacobian, moving, turn = self._motion(foot, step, positions[own].mean(axis=0), body)
+            speed, drift = moving
+            if close and (loaded or (soon and feet.velocity[foot, step, 2] < DOWN * units.length * units.frequency)):
+                standing.append(self._standing(jacobian, speed, drift, turn))
+                for point in own:
+                    arm = skew(positions[point] - positions[own].mean(axis=0))
+                    points.append(int(point))
+                    jacobians.append(jacobian[:3] - arm @ jacobian[3:])
+                    cones.append(self._cone(normals[:, point], tangents[:, 2 * point : 2 * point + 2]))
+            else:
+                error = np.concatenate([feet.middle[foot, step] - positions[own].mean(axis=0), turn])
+                swinging.append((jacobian, self._swing(foot, step, error, speed, late=bool(loaded)) - drift, soon))
+        weights = self._weights
+        for jacobian, wanted, soon in swinging:
+            weight = weights.foot if points else weights.foot_soon * soon
+            standing.append(_Task(matrix=jacobian, wanted=wanted, weight=self._weight(weight)))
+        return standing, self._contacts(points, jacobians, cones)
+
+    def _motion(self, foot: int, step: int, middle: Array, body: int) -> tuple[Array, tuple[Array, Array], Array]:
+        """Return a foot's Jacobian, its velocity and J̇ ν, and how far it is turned from the plan [rad].
+
+        Args:
+            foot: its number.
+            step: row of the plan.
+            middle: of its contact points [m], (3,).
+            body: MuJoCo's number of it.
+        """
+        model, data = self._belief.simulation.model, self._belief.data
+        rate = np.zeros((6, model.nv))
+        mujoco_module().mj_jacDot(model, data, rate[:3], rate[3:], middle, body)
+        turn = rotation_vector(self._feet.rotation[foot, step] @ data.xmat[body].reshape(3, 3).T)
+        both = np.zeros((6, model.nv))
+        mujoco_module().mj_jac(model, data, both[:3], both[3:], middle, body)
+        return both @ self._belief.of_joints, (both @ data.qvel, rate @ data.qvel), turn
+
+    def _weight(self, weight: float) -> Array:
+        """Return a weight of linear and turning accelerations, (6,), from that in the robot's own units."""
+        return weight * np.repeat([self._units.gravity**-2, self._units.frequency**-4], 3)
+
+    def _standing(self, jacobian: Array, speed: Array, drift: Array, turn: Array) -> _Task:
+        """Return the task of a foot that stands: it comes to rest, level where the plan has it so.
+
+        Args:
+            jacobian: of the foot.
+            speed: its velocity [m/s, rad/s], (6,).
+            drift: J̇ ν, (6,).
+            turn: how far it is turned from the plan [rad], (3,).
+        """
+        rate = self._gains.stance_rate * self._units.frequency
+        wanted = -rate * speed
+        wanted[3:5] += 0.25 * rate**2 * turn[:2]
+        return _Task(matrix=jacobian, wanted=wanted - drift, weight=self._weight(self._weights.stance))
+
+    def _swing(self, foot: int, step: int, error: Array, speed: Array, *, late: bool) -> Array:
+        """Return the acceleration of a foot in the air [m/s², rad/s²], (6,).
+
+        Args:
+            foot: its number.
+            step: row of the plan.
+            error: from where it is to the plan [m, rad], (6,).
+            speed: its velocity [m/s, rad/s], (6,).
+            late: it should stand already.
+        """
+        gains, units, feet = self._gains, self._units, self._feet
+        damping = gains.foot_rate * units.frequency
+        wanted = feet.acceleration[foot, step] + gains.foot * units.frequency**2 * error
+        wanted = wanted + damping * (feet.velocity[foot, step] - speed)
+        if late:
+            wanted[2] = damping * (-DOWN * units.length * units.frequency - speed[2])
+        return np.asarray(wanted)
+
+    def _cone(self, normal: Array, tangents: Array) -> Array:
+        """Return the rows of a pyramid within the friction cone: C f ≤ 0, (sides, 3)."""
+        friction = FRICTION_SHARE * self._belief.friction * np.cos(np.pi / SIDES)
+        angles = 2.0 * np.pi * (np.arange(SIDES) + 0.5) / SIDES
+        return np.asarray(
+            np.outer(np.cos(angles), tangents[:, 0]) + np.outer(np.sin(angles), tangents[:, 1]) - friction * normal
+        )
+
+    def _contacts(self, points: list[int], jacobians: list[Array], cones: list[Array]) -> _Contacts:
+        rows = np.zeros((SIDES * len(points), 3 * len(points)))
+        for index, cone in enumerate(cones):
+            rows[SIDES * index : SIDES * (index + 1), 3 * index : 3 * (index + 1)] = cone
+        columns = self._belief.of_joints.shape[1]
+        return _Contacts(points=points, jacobian=np.vstack([np.zeros((0, columns)), *jacobians]), cones=rows)
+
+    def _momentum(self, mass: Array, bias: Array, step: int, errors: Array) -> tuple[_Task, _Task]:
+        """Return the tasks of the momentum's rates.
+
+        Args:
+            mass: M.
+            bias: h.
+            step: row of the plan.
+            errors: of CoM, its velocity, the attitude and the angular momentum.
+        """
+        gains, units, plan, data = self._gains, self._units, self._plan, self._belief.data
+        turn, arm, rate = self._belief.rotation, skew(data.subtree_com[1] - data.xpos[1]), units.frequency
+        gravity = self._belief.simulation.robot.gravity
+        stiffness = np.array([gains.com, gains.com, gains.height]) * rate**2
+        damping = np.array([gains.com_rate, gains.com_rate, gains.height_rate]) * rate
+        linear = plan.com_acceleration[step] - stiffness * errors[:3] - damping * errors[3:6]
+        angular = plan.angular_momentum_rate[step] - gains.spin_rate * rate * errors[9:12]
+        return (
+            _Task(
+                matrix=mass[:3] / units.mass,
+                wanted=linear - bias[:3] / units.mass - gravity,
+                weight=np.full(3, self._weights.com / units.gravity**2),
+            ),
+            _Task(
+                matrix=turn @ mass[3:6] - arm @ mass[:3],
+                wanted=angular - (turn @ bias[3:6] - arm @ bias[:3]),
+                weight=np.full(3, self._weights.spin / units.moment**2),
+            ),
+        )
+
+    def _attitude(self, step: int, stands: bool) -> _Task:
+        """Return the task of the base's attitude."""
+        gains, plan, rate, turn = self._gains, self._plan, self._units.frequency, self._belief.rotation
+        matrix = np.zeros((3, self._belief.of_joints.shape[1]))
+        matrix[:, 3:6] = turn
+        away = rotation_vector(plan.rotation[step] @ turn.T)
+        slow = plan.base_velocity[step, 3:] - turn @ self._belief.data.qvel[3:6]
+        wanted = plan.base_acceleration[step, 3:] + gains.base * rate**2 * away + gains.base_rate * rate * slow
+        weight = self._weights.base if stands else self._weights.base_in_flight
+        return _Task(matrix=matrix, wanted=wanted, weight=np.full(3, weight / rate**4))
+
+    def _posture(self, state: State, step: int, stands: bool) -> _Task:
+        """Return the task of the joints.
+
+        Args:
+            state: as it was measured.
+            step: row of the plan.
+            stands: a foot stands.
+        """
+        gains, plan, rate, weights = self._gains, self._plan, self._units.frequency, self._weights
+        count = self._shift.size
+        away = plan.joints[step] + self._shift - state.joint_positions
+        slow = plan.joint_velocities[step] - state.joint_velocities
+        wanted = plan.joint_accelerations[step] + gains.joint * rate**2 * away + gains.joint_rate * rate * slow
+        weight = np.where(self._legs, weights.legs, weights.others) if stands else np.full(count, weights.flying)
+        return _Task(matrix=np.eye(count, count + 6, 6), wanted=wanted, weight=weight / rate**4)
+
+    def _least(self, tasks: list[_Task], contacts: _Contacts, mass: Array, bias: Array, step: int) -> Array:
+        """Return the torques of the program's solution [N m or N], (n,).
+
+        Its unknowns are ν̇ and f in the robot's own units, so that all are about as large.
+
+        Args:
+            tasks: what is wanted of ν̇.
+            contacts: the points that may push.
+            mass: M.
+            bias: h − J_Tᵀ T.
+            step: row of the plan.
+        """
+        units, size = self._units, len(mass)
+        matrix, weight = np.vstack([task.matrix for task in tasks]), np.concatenate([task.weight for task in tasks])
+        wanted, count = np.concatenate([task.wanted for task in tasks]), 3 * len(contacts.points)
+        scale = np.repeat([units.gravity, units.frequency**2, units.force], [3, size - 3, count])
+        torques = np.hstack([mass[6:], -contacts.jacobian.T[6:]]) * scale / units.moment
+        offset, limits = bias[6:] / units.moment, self._limits() / units.moment
+        hessian = self._weights.torque * torques.T @ torques
+        gradient = self._weights.torque * offset @ torques
+        weighted = weight[:, None] * matrix * scale[:size]
+        hessian[:size, :size] += (matrix * scale[:size]).T @ weighted
+        gradient[:size] -= wanted @ weighted
+        of_force = self._weights.force
+        hessian[range(len(scale)), range(len(scale))] += np.repeat([1e-6, of_force], [size, count])
+        gradient[size:] -= of_force * self._plan.contact_forces[step][contacts.points].ravel() / units.force
+        share = np.repeat([units.force, units.moment], 3)
+        base = np.hstack([mass[:6], -contacts.jacobian.T[:6]]) * scale / share[:, None]
+        limited = np.isfinite(limits)
+        rows = np.zeros((len(contacts.cones) + int(limited.sum()), len(scale)))
+        rows[: len(contacts.cones), size:], rows[len(contacts.cones) :] = contacts.cones, torques[limited]
+        lower = np.concatenate([np.full(len(contacts.cones), -np.inf), (-limits - offset)[limited]])
+        upper = np.concatenate([np.zeros(len(contacts.cones)), (limits - offset)[limited]])
+        found = _quadratic(hessian, gradient, base, -bias[:6] / share, rows, lower, upper)
+        if found is None:  # no forces hold it; the servos do what they can
+            return np.asarray(np.clip(self._torques, -self._limits(), self._limits()))
+        return np.asarray(np.clip((torques @ found + offset) * units.moment, -self._limits(), self._limits()))
+
+    def _limits(self) -> Array:
+        assert self._robot is not None
+        return np.asarray(self._robot.joint_limits.effort)
+
+
+def _quadratic(
+    hessian: Array, gradient: Array, equal: Array, to: Array, rows: Array, lower: Array, upper: Array
+) -> Array | None:
+    """Return x of least ½ xᵀ H x + gᵀ x with A x = b and l ≤ C x ≤ u; None where there is none.
+
+    Args:
+        hessian: H.
+        gradient: g.
+        equal: A.
+        to: b.
+        rows: C.
+        lower: l.
+        upper: u.
+    """
+    piqp = solver_module()
+    solver = piqp.DenseSolver()
+    solver.settings.verbose = False
+    solver.settings.eps_abs = solver.settings.eps_rel = ACCURACY
+    solver.settings.max_iter = ITERATIONS
+    bounds = (np.asfortranarray(rows), lower, upper) if len(rows) else (None, None, None)
+    solver.setup(np.asfortranarray(hessian), gradient, np.asfortranarray(equal), to, *bounds)
+    status = solver.solve()
+    if status not in (piqp.PIQP_SOLVED, piqp.PIQP_MAX_ITER_REACHED):
+        return None
+    return np.array(solver.result.x)
