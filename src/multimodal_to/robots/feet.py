@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import trimesh
 
 from multimodal_to.adam.spatial import Array
 
@@ -38,6 +37,8 @@ def contact_points(points: Array, height: float) -> Array:
 def _sole(points: Array, height: float) -> Array | None:
     if np.linalg.matrix_rank(points - points.mean(axis=0), tol=FLAT * height) < 3:
         return None
+    import trimesh  # takes a second to import
+
     hull = trimesh.convex.convex_hull(points)
     downward = hull.face_normals[:, 2] < -np.cos(TILTED)
     best, widest = None, 0.0

@@ -14,7 +14,6 @@ from multimodal_to.errors import ModelError, MultimodalError, OutputError
 from multimodal_to.files.packages import package_file
 from multimodal_to.files.writing import write_text
 from multimodal_to.models.robot import ROBOT_FILE, Robot, load_robot
-from multimodal_to.replay.meshes import find_mesh
 from multimodal_to.robots.drafting import draft
 from multimodal_to.robots.writing import toml
 
@@ -117,6 +116,8 @@ def _finds_as_many_meshes(copy: Path, source: Path) -> bool:
 
 
 def _is_found(mesh: str, urdf: Path) -> bool:
+    from multimodal_to.replay.meshes import find_mesh
+
     try:
         find_mesh(mesh, urdf)
     except MultimodalError:

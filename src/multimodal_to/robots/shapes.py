@@ -11,7 +11,6 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.urdf import parse_urdf
 from multimodal_to.errors import MultimodalError
-from multimodal_to.replay.meshes import load_parts
 
 _AROUND = 24  # points around a cylinder's rim
 _RINGS = 13  # of a sphere
@@ -52,6 +51,8 @@ def _of_geometry(geometry: Any, urdf: Path) -> Array:
         heights = np.cos(np.linspace(0.0, np.pi, _RINGS))
         rings = [np.column_stack([np.sqrt(1.0 - z * z) * circle, np.full(_AROUND, z)]) for z in heights]
         return float(geometry.sphere.radius) * np.vstack(rings)
+    from multimodal_to.replay.meshes import load_parts  # takes a second to import
+
     mesh = geometry.mesh
     scale = np.ones(3) if mesh.scale is None else np.broadcast_to(np.asarray(mesh.scale, dtype=float), 3)
     try:
