@@ -240,7 +240,7 @@ class WholeBodyController:
         simulation, data = self._belief.simulation, self._belief.data
         jacobian, turning = np.zeros((3, simulation.model.nv)), np.zeros((3, simulation.model.nv))
         total = np.zeros(simulation.model.nv)
-        for site, jet, thrust in zip(simulation.jets, self._robot.jets, state.thrust, strict=True):
+        for site, jet, thrust in zip(simulation.jets, simulation.robot.jets, state.thrust, strict=True):
             mujoco_module().mj_jacSite(simulation.model, data, jacobian, turning, site)
             total -= thrust * (data.site_xmat[site].reshape(3, 3)[:, 2] @ (jacobian + jet.drag * turning))
         return np.asarray(total @ self._belief.of_joints)
