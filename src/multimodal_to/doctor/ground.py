@@ -35,7 +35,7 @@ def height(task: Task) -> Iterator[Symptom]:
     if task.end_posture is None:
         # Elsewhere the ground is another, and the feet may find a place that one search has not; `build` needs the
         # posture where there is no other.
-        certain = (task.on_plane or not task.stands_at_start) and task.scenario.final_com is not None
+        certain = (task.on_plane or not task.stands_at_start) and task.scenario.says_end_com
         yield (error if certain else warning)(
             "standing end", _no_posture(task, scenario.end_com), _other_height(task, "final")
         )

@@ -112,7 +112,7 @@ def _heights(task: Task) -> Iterator[tuple[str, float, int]]:
     scenario = task.scenario
     if scenario.mid_height_min is not None:
         yield f"mid_height_min, {scenario.mid_height_min:g} m,", scenario.mid_height_min, scenario.knots // 2
-    if scenario.terminal is Terminal.FREE and scenario.final_com is not None:
+    if scenario.terminal is Terminal.FREE and scenario.says_end_com:
         yield f"the height of final_com, {scenario.end_com[2]:g} m,", scenario.end_com[2], scenario.knots
     for one in scenario.own_keyframes():
         for what, least, _ in one.keyframe.limits() if one.keyframe.weight is None else ():

@@ -164,7 +164,9 @@ class Margins:
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
-    """A task: where the CoM starts and ends, in how many knots and how much time, and the weights.
+    """A task: how a motion starts, passes and ends, in how many knots and how much time, and the weights.
+
+    Start, end and what keyframes ask for between may be said by short names or by `keyframes`.
 
     Raises:
         ScenarioError: numbers that contradict each other.
@@ -282,6 +284,13 @@ class Scenario:
         for one in sorted(self.placed(), key=lambda some: some.knot):
             known |= {} if isinstance(one.keyframe.com, str) else by_axis(one.keyframe.com)
         return known["x"], known["y"], known["z"]
+
+    @property
+    def says_end_com(self) -> bool:
+        """Return whether the whole CoM is asked for at the end, by `final_com` or by a keyframe."""
+        return self.final_com is not None or any(
+            one.of_home or isinstance(one.com, tuple) for one in self._held_at(self.knots)
+        )
 
     @checked
     def for_robot(self, robot: Robot) -> Scenario:
