@@ -42,17 +42,23 @@ def robot(tmp_path_factory) -> mt.Robot:
 def values(robot) -> dict[str, Any]:
     """A value of every public dataclass whose fields a person fills in, by its name."""
     return {
+        "Box": mt.Box(lower=(0.0, 0.0, 0.0), upper=(1.0, 1.0, 1.0)),
         "Constraint": mt.Constraint(value=len, within=mt.equal(), unit="m"),
+        "ContactStretch": mt.ContactStretch(of=("left",), state=mt.ContactState.OFF),
         "Cost": mt.Cost(residual=len, weight=1.0, unit="m"),
         "FlatGround": mt.FlatGround(),
         "Formulation": mt.Formulation.paper(),
+        "GaitPlan": mt.GaitPlan(kind=mt.GaitKind.WALK, steps=2),
         "HeightField": mt.HeightField(x_range=(0, 1), y_range=(0, 1), heights=[[0.0] * 4] * 4),
         "Ipopt": mt.Ipopt(),
+        "JetFailure": mt.JetFailure(jet="left arm"),
+        "KnownPush": mt.KnownPush(of="chest", force=(1.0, 0.0, 0.0)),
         "Margins": mt.Margins(),
         "Plane": mt.Plane(slope=0.1),
         "Scenario": mt.scenarios.take_off(),
         "Stairs": mt.Stairs(edges=[0.0], heights=[0.0, 0.1]),
         "Trajectory": at_rest(robot),
+        "Wall": mt.Wall(normal=(1.0, 0.0, 0.0), offset=0.0),
         "Weights": mt.Weights(),
     }
 
