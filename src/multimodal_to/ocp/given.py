@@ -129,8 +129,11 @@ def set_start(bounds: Bounds, robot: Robot, scenario: Scenario, initial: State, 
     heights = places[2] - heights_below(scenario.surface, places)
     least = 0.5 * scenario.contact_bounds(robot)[0] / np.maximum(heights, _IN_THE_AIR)
     above, left = np.repeat(heights > _IN_THE_AIR, 3), np.repeat(np.minimum(NO_FORCE, least), 3)
-    bounds.lower["contact_forces"][above, 0] = -left[above]
-    bounds.upper["contact_forces"][above, 0] = left[above]
+    lower, upper = (side["contact_forces"] for side in (bounds.lower, bounds.upper))
+    lower[above, 0], upper[above, 0] = (
+        np.maximum(lower[above, 0], -left[above]),
+        np.minimum(upper[above, 0], left[above]),
+    )
 
 
 AT_START: Mapping[str, Callable[[Robot, State], Array]] = FrozenMapping(
