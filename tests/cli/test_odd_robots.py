@@ -57,6 +57,7 @@ COMMANDS = {
         f"plot, {figure}": ["plot", "motion.npz", "--robot", "robot", "--figure", figure]
         for figure in ("joints", "forces")
     },
+    "plot, all": ["plot", "motion.npz", "--robot", "robot", "--figure", "all"],
     "plot, two": ["plot", "motion.npz", "motion.npz", "--robot", "robot", "-o", "two.svg"],
     "replay": ["replay", "motion.npz", "--robot", "robot", "--html", "page.html", "--with", "motion.npz"],
     "report": ["report", "motion.npz", "--robot", "robot"],
@@ -94,8 +95,9 @@ def test_every_command_is_tried():
 
 @pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)
 def test_a_command_works_or_says_in_one_sentence_why_not(folder, command, request):
-    if command[0] == "report" and not any(f"[{name}-" in request.node.name for name in DRAWN):
-        pytest.skip("a report draws all figures, which takes long: for some robots only")
+    draws_all = command[0] == "report" or "all" in command
+    if draws_all and not any(f"[{name}-" in request.node.name for name in DRAWN):
+        pytest.skip("to draw all figures takes long: for some robots only")
     ended = run(*command, cwd=folder)
     assert ended.returncode in (0, 1, 2)
     # In the air four intervals leave fewer variables than rows, of which CasADi warns.
