@@ -78,6 +78,7 @@ COMMANDS = {
         f"plot, {figure}": ["plot", "motion.npz", "--robot", "robot", "--figure", figure]
         for figure in ("joints", "forces")
     },
+    "plot, all": ["plot", "motion.npz", "--robot", "robot", "--figure", "all"],
     "plot, two": ["plot", "motion.npz", "motion.npz", "--robot", "robot", "-o", "two.svg"],
     "replay": ["replay", "motion.npz", "--robot", "robot", "--html", "page.html", "--with", "motion.npz"],
     "replay, pictures": [
@@ -142,7 +143,8 @@ def test_every_command_is_tried_with_every_option(path):
 def test_a_command_works_or_says_in_one_sentence_why_not(folder, command, request):
     if command[0] == "replay" and "--gif" in command and find_browser() is None:
         pytest.skip("there is no browser to take pictures with")
-    if (command[0] == "report" or "--gif" in command) and not any(f"[{name}-" in request.node.name for name in DRAWN):
+    draws_much = command[0] == "report" or "--gif" in command or "all" in command
+    if draws_much and not any(f"[{name}-" in request.node.name for name in DRAWN):
         pytest.skip("it takes long: for some robots only")
     ended = run(*command, cwd=folder)
     assert ended.returncode in (0, 1, 2)

@@ -213,3 +213,32 @@ def test_a_joint_that_others_follow_is_planned_in_the_range_that_they_allow(tmp_
     table.write_text(table.read_text(encoding="utf-8").replace("home = 0.0", "home = 0.5"), encoding="utf-8")
     with pytest.raises(ModelError, match=r"home 0.5 of 'left_pitch' is not within -0.8 to 0.2, the range in which its"):
         load_robot(tmp_path)
+
+
+def test_a_urdf_of_a_package_is_found_where_the_package_is_and_else_refused_with_the_reason(folder, tmp_path):
+    table = (folder / "robot.toml").read_text(encoding="utf-8")
+    (tmp_path / "cub_description" / "urdf").mkdir(parents=True)
+    urdf = tmp_path / "cub_description" / "urdf" / "cub.urdf"
+    urdf.write_bytes((folder / "ironcub.urdf").read_bytes())
+    (tmp_path / "robots" / "cub").mkdir(parents=True)
+
+    def load(address):
+        text = table.replace('urdf = "ironcub.urdf"', f'urdf = "{address}"', 1)
+        (tmp_path / "robots" / "cub" / "robot.toml").write_text(text, encoding="utf-8")
+        return load_robot(tmp_path / "robots" / "cub")
+
+    assert load("package://cub_description/urdf/cub.urdf").urdf == urdf  # in a folder above
+    for address, sentence in {
+        "package://cub_description/urdf/cab.urdf": r"the folder '.*cub_description' has no 'urdf/cab.urdf'",
+        "package://cab_description/urdf/cub.urdf": r"no folder 'cab_description' lies .* and no package",
+        "package://cub_description/../secret.urdf": "expected a path inside the robot's folder, or package://",
+        "https://example.org/cub.urdf": "expected a path inside the robot's folder, or package://",
+    }.items():
+        with pytest.raises(ModelError, match=sentence):
+            load(address)
+
+
+def test_a_bundled_robot_may_have_its_urdf_in_an_installed_package():
+    robot = load_robot("solo12")
+    assert "example-robot-data" in robot.urdf.as_posix()
+    assert robot.mass == pytest.approx(2.5, abs=1e-3)

@@ -251,7 +251,7 @@ def thrust_dynamics(interval: Interval, parameters: Parameters) -> SX:
     without a lag T(u⁺) − T⁺ = 0.
     """
     gaps = interval.velocity_gap(lambda knot: knot.thrust_rate, thrust_acceleration)
-    for index, jet in enumerate(parameters.robot.jets):
+    for index, jet in enumerate(interval.end.robot.jets):
         if jet.model.order == 1:
             gaps[index] = interval.end.thrust_rate[index] - interval.mean(partial(_imbalance, index))
         elif jet.model.order == 0:

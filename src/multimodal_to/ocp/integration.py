@@ -35,16 +35,6 @@ class IntegrationRule(Protocol):
         """
         ...
 
-    def mean(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
-        """Return what a quantity of knots is over the interval, where it makes a velocity at once.
-
-        Args:
-            quantity: as a function of a knot.
-            start: the interval's first knot.
-            end: the interval's second knot.
-        """
-        ...
-
     def at_accelerations(self, start: Knot, end: Knot) -> Knot:
         """Return what acts between the velocities of two knots: configuration, forces and throttles that change them.
 
@@ -71,16 +61,6 @@ class BackwardEuler:
     name: str = rules.BACKWARD_EULER
 
     def over(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
-        """Return the quantity at the interval's end.
-
-        Args:
-            quantity: as a function of a knot.
-            start: the interval's first knot.
-            end: the interval's second knot.
-        """
-        return quantity(end)
-
-    def mean(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
         """Return the quantity at the interval's end.
 
         Args:
@@ -127,16 +107,6 @@ class Leapfrog:
             end: the interval's second knot.
         """
         return quantity(end)
-
-    def mean(self, quantity: KnotQuantity, start: Knot, end: Knot) -> SX:
-        """Return the mean of the quantity at both ends.
-
-        Args:
-            quantity: as a function of a knot.
-            start: the interval's first knot.
-            end: the interval's second knot.
-        """
-        return 0.5 * (quantity(start) + quantity(end))
 
     def at_accelerations(self, start: Knot, end: Knot) -> Knot:
         """Return the interval's start, where two intervals meet, with the mean of their velocities.
@@ -193,8 +163,9 @@ class Interval(Value):
         return self.rule.over(quantity, self.start, self.end)
 
     def mean(self, quantity: KnotQuantity) -> SX:
-        """Return what a quantity of knots is over the interval, where it makes a velocity at once."""
-        return self.rule.mean(quantity, self.start, self.end)
+        """Return the mean over the interval of what follows the throttles of knots, which act as the rule says."""
+        after = rules.acts_after(self.rule.name)
+        return after * quantity(self.start) + (1.0 - after) * quantity(self.end) if after else quantity(self.end)
 
     def gap(self, quantity: KnotQuantity, rate: KnotQuantity) -> SX:
         """Return y⁺ − y − v Δt of something like a position, which is zero where the interval closes.

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.models.jet import JetModel
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.scene import Y_TO_Z, Scene, SmoothMesh, segment, shapes, translation, turns_from_z
 from multimodal_to.trajectory import Trajectory
@@ -26,6 +27,7 @@ _LAYERS = (  # of a flame, each drawn over those before: colour, width and lengt
     ("middle", 0xFFA935, 0.74, 0.74, 0.60),
     ("core", 0xFFF6DC, 0.46, 0.46, 0.85),
 )
+_AIR = (("plume", 0xBFD9EC, 1.0, 1.0, 0.30), ("core", 0xFFFFFF, 0.5, 0.7, 0.35))  # of what does not burn, likewise
 _FAINTEST = 0.25  # opacity of a flame almost without thrust, as a share of that at full thrust
 _COM_COLOUR = 0x2B6CE0
 _TRACE_RADIUS = 0.003  # of the way of the CoM [m]
@@ -36,7 +38,7 @@ _TRACE_WITHIN = 0.35  # opacity of its part that is inside the robot
 def draw_flames(
     scene: Scene, robot: Robot, thrust: Array, paths: Mapping[str, str], *, opacity: float = 1.0, steady: bool = False
 ) -> None:
-    """Draw at each jet a flame along +z of its frame, where the exhaust leaves.
+    """Draw at each turbine a flame along +z of its frame, where the exhaust leaves, and at a rotor its stream of air.
 
     Its length is `FLAME_LENGTH` T / T_max of the strongest jet; its opacity grows linearly with T / T_max of its own.
 
@@ -56,7 +58,8 @@ def draw_flames(
         path = f"{paths[jet.frame]}/flame" + (f"_{burning}" if burning else "")
         radius = _NOZZLE_RADIUS * math.sqrt(jet.thrust_max / strongest)
         glow = opacity * (_FAINTEST + (1.0 - _FAINTEST) * np.minimum(row / jet.thrust_max, 1.0))
-        for name, colour, width, length, brightest in _LAYERS:
+        burns = isinstance(jet.model, JetModel)
+        for name, colour, width, length, brightest in _LAYERS if burns else _AIR:
             material = shapes.MeshBasicMaterial(
                 color=colour,
                 opacity=float(brightest * (opacity if steady else glow[0])),

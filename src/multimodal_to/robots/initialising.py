@@ -63,7 +63,8 @@ def init(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot make the folder '{folder}': {error.strerror or error}") from error
-    write_text(folder / ROBOT_FILE, toml(found, _placed(source, folder)))
+    text = toml(found, _placed(source, folder))
+    write_text(folder / ROBOT_FILE, text)
     notes = [f"joint '{joint}' is held at zero: {reason}" for joint, reason in found.left_out.items()]
     guessed = [joint.name for joint, of in zip(found.joints, found.ranges, strict=True) if of.guesses]
     if guessed:
@@ -82,8 +83,10 @@ def _placed(source: Path, folder: Path) -> str:
     if address := _in_package(source.resolve()):
         return address
     target = folder / source.name
-    if target.exists() and target.samefile(source):
-        return source.name
+    if target.exists():
+        if target.samefile(source):
+            return source.name
+        raise OutputError(f"'{target}' exists; expected a folder without another URDF of that name")
     try:
         shutil.copyfile(source, target)
         if not _finds_as_many_meshes(target, source):
