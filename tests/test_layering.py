@@ -21,7 +21,7 @@ FLOORS = [
     {"scenarios", "exporting"},
     {"ocp", "auditing", "simulation", "replay"},
     {"solving"},
-    {"doctor", "plotting"},
+    {"doctor", "plotting", "sweeping"},
     {"reporting", "robots"},
     {"cli", "__init__"},
     {"__main__"},

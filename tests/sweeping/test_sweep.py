@@ -38,6 +38,7 @@ interval_max = 0.2
 final_com_height = { from = 0.53, to = 0.56, count = 3 }
 "robot.mass" = [0.98, 1.02]
 """
+sweeping_module = sys.modules["multimodal_to.sweeping.sweep"]
 TIMES = ("seconds", "solve_seconds", "cpu_seconds", "attempts")
 
 
@@ -365,4 +366,18 @@ def test_counts_say_rate_and_time_left():
     assert sweeping is mt.sweep
 
 
-sweeping_module = sys.modules["multimodal_to.sweeping.sweep"]
+@pytest.mark.filterwarnings("default")
+def test_a_ray_cluster_makes_the_same_rows_as_processes(file, tmp_path):
+    pytest.importorskip("ray")
+    mt.sweep(file, tmp_path / "here", workers=1)
+    mt.sweep(file, tmp_path / "ray", engine="ray", workers=2)
+    assert lasting(tmp_path / "ray") == lasting(tmp_path / "here")
+
+
+def test_the_table_is_parquet_too_where_pyarrow_is(tmp_path, monkeypatch):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    monkeypatch.setattr(sweeping_module, "Processes", lambda workers: Fake(solved))
+    mt.sweep(small(grid={"friction": (0.3, 0.4)}), tmp_path / "s")
+    table = parquet.read_table(tmp_path / "s" / "table.parquet").to_pydict()
+    assert table["friction"] == [0.3, 0.4]
+    assert table["status"] == ["optimal", "optimal"]

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.adam.urdf import read_urdf
 from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, unknown
-from multimodal_to.exporting.frames import Frames, frames_of, quaternions
+from multimodal_to.exporting.frames import Frames, frames_of
 from multimodal_to.exporting.layouts import ORDERS, layout_of
+from multimodal_to.exporting.locomujoco import WXYZ, model_arrays, subtree_coms
 from multimodal_to.files.writing import whole
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory
@@ -25,8 +25,6 @@ from multimodal_to.values import FrozenMapping
 
 WORLD = "world"
 """What holosoma and LocoMuJoCo call MuJoCo's body that does not move."""
-_WXYZ = [3, 0, 1, 2]
-"""Where w x y z stand in x y z w."""
 _EXTRAS = (
     "Readers do not need: time [s]; contact_state, contact_force (frames, points, 3) [N] on the robot in world axes; "
     "thrust [N], throttle [%]; joint_torque [N m or N] by inverse dynamics; com_position [m], com_velocity [m/s]; each "
@@ -132,9 +130,9 @@ def _write_holosoma(frames: Frames, path: Path) -> None:
 def _write_locomujoco(frames: Frames, path: Path) -> None:
     """Write what `Trajectory.load` of LocoMuJoCo takes; it refuses any key that it does not know."""
     qpos, qvel = _coordinates(frames)
-    positions, quaternions_wxyz = frames.body_positions, frames.body_quaternions_xyzw[..., _WXYZ]
+    positions, quaternions_wxyz = frames.body_positions, frames.body_quaternions_xyzw[..., WXYZ]
     count, robot, motion = motion_count(frames), frames.robot, frames.motion
-    coms = _subtree_coms(frames)  # MuJoCo's velocities are those at the CoM of all, which is the world's
+    coms = subtree_coms(frames)  # MuJoCo's velocities are those at the CoM of all, which is the world's
     about = frames.at(np.broadcast_to(coms[:, :1], positions.shape))
     cvel = np.concatenate([frames.body_velocities[..., 3:], about], axis=2)
     world = np.zeros((count, 1, 3))
@@ -156,7 +154,7 @@ def _write_locomujoco(frames: Frames, path: Path) -> None:
         "body_names": np.array(names),
         "site_names": np.array(list(sites), dtype=np.str_),
         "frequency": np.array(frames.fps),
-        **_mujoco_model(frames, list(sites.values())),
+        **model_arrays(frames, list(sites.values())),
     }
     metadata = {
         name: np.asarray(value).tolist() for name, value in {**_texts(frames, "locomujoco"), **_extras(frames)}.items()
@@ -201,7 +199,7 @@ def _bodies(frames: Frames, linear: Array) -> dict[str, Array]:
     """
     return {
         "body_pos_w": frames.body_positions,
-        "body_quat_w": frames.body_quaternions_xyzw[..., _WXYZ],
+        "body_quat_w": frames.body_quaternions_xyzw[..., WXYZ],
         "body_lin_vel_w": linear,
         "body_ang_vel_w": frames.body_velocities[..., 3:],
     }
@@ -211,7 +209,7 @@ def _coordinates(frames: Frames) -> tuple[Array, Array]:
     """Return MuJoCo's qpos and qvel of a free base: quaternion w x y z, angular velocity in the base's axes."""
     motion = frames.motion
     turning = np.einsum("kij,ik->kj", base_poses(motion)[:, :3, :3], motion.base_angular_velocity)
-    qpos = np.hstack([motion.base_position.T, frames.base_quaternion_xyzw[:, _WXYZ], frames.joint_positions])
+    qpos = np.hstack([motion.base_position.T, frames.base_quaternion_xyzw[:, WXYZ], frames.joint_positions])
     return qpos, np.hstack([motion.base_linear_velocity.T, turning, frames.joint_velocities])
 
 
@@ -264,99 +262,6 @@ def _save(
 def _savez(path: Path, arrays: Mapping[str, Array]) -> None:
     with path.open("wb") as stream:
         np.savez_compressed(stream, allow_pickle=False, **arrays)
-
-
-# ---------------------------------------------------------------- what LocoMuJoCo wants of the model
-
-
-def _parents(frames: Frames) -> list[int]:
-    """Return which body of the layout each hangs on, −1 for the base."""
-    _, joints = read_urdf(frames.robot.urdf)
-    above, bodies = {joint.child: joint.parent for joint in joints}, frames.layout.bodies
-    parents = []
-    for body in bodies:
-        link = above.get(body)
-        while link is not None and link not in bodies:
-            link = above.get(link)
-        parents.append(-1 if link is None else bodies.index(link))
-    return parents
-
-
-def _subtree_coms(frames: Frames) -> Array:
-    """Return MuJoCo's subtree_com: the CoM of each body with all that hangs on it [m], (frames, 1 + bodies, 3)."""
-    parents, masses, coms = _parents(frames), np.array([body.mass for body in frames.masses]), frames.body_coms
-    carried = np.zeros((len(parents), len(parents)))  # [body, what is in its subtree]
-    for index in range(len(parents)):
-        above = index
-        while above >= 0:
-            carried[above, index] = masses[index]
-            above = parents[above]
-    totals = np.maximum(carried.sum(axis=1), 1e-12)
-    found = np.einsum("bi,tix->tbx", carried / totals[:, None], coms)
-    return np.concatenate([found[:, parents.index(-1)][:, None], found], axis=1)
-
-
-def _mujoco_model(frames: Frames, sites: list[str]) -> dict[str, Array]:
-    """Return what LocoMuJoCo keeps of a model: kinds of joints, and how bodies and sites are fixed to one another.
-
-    Args:
-        frames: whose layout is the model.
-        sites: frames by name.
-    """
-    kinds = {joint.name: joint.kind for joint in read_urdf(frames.robot.urdf)[1]}
-    free, slide, hinge = 0, 2, 3  # mjtJoint
-    tree, parents, home = frames.robot.kindyn.tree, _parents(frames), frames.body_poses[0]
-    at_zero = _poses_at_zero(frames)
-    relative = [at_zero[i] if p < 0 else np.linalg.inv(at_zero[p]) @ at_zero[i] for i, p in enumerate(parents)]
-    relative[parents.index(-1)] = home[parents.index(-1)]
-    owners = [_owner(frames, frame) for frame in sites]
-    placed = [
-        np.array(frames.robot.kindyn.forward_kinematics(frame, np.eye(4), np.zeros(len(tree.joints))))
-        for frame in sites
-    ]
-    mounted = [np.linalg.inv(at_zero[owner]) @ pose for owner, pose in zip(owners, placed, strict=True)]
-    principal = [np.linalg.eigh(body.inertia)[1] for body in frames.masses]
-    principal = [axes * np.sign(np.linalg.det(axes)) for axes in principal]
-    count = len(parents) + 1
-    return {
-        "njnt": np.array(len(frames.layout.joints) + 1),
-        "jnt_type": np.array([free, *(slide if kinds[n] == "prismatic" else hinge for n in frames.layout.joints)]),
-        "nbody": np.array(count),
-        "body_rootid": np.array([0] + [1 + parents.index(-1)] * len(parents)),
-        "body_weldid": np.arange(count),
-        "body_mocapid": np.full(count, -1),
-        "body_pos": np.array([np.zeros(3), *(pose[:3, 3] for pose in relative)]),
-        "body_quat": _quaternions_wxyz([np.eye(3), *(pose[:3, :3] for pose in relative)]),
-        "body_ipos": np.array([np.zeros(3), *(body.com for body in frames.masses)]),
-        "body_iquat": _quaternions_wxyz([np.eye(3), *principal]),
-        "nsite": np.array(len(sites)),
-        "site_bodyid": np.array([owner + 1 for owner in owners], dtype=int),
-        "site_pos": np.array([pose[:3, 3] for pose in mounted]).reshape(-1, 3),
-        "site_quat": _quaternions_wxyz([pose[:3, :3] for pose in mounted]),
-    }
-
-
-def _quaternions_wxyz(rotations: list[Array]) -> Array:
-    return quaternions(np.array(rotations).reshape(-1, 3, 3)).T[:, _WXYZ]
-
-
-def _poses_at_zero(frames: Frames) -> list[Array]:
-    kindyn = frames.robot.kindyn
-    still = np.zeros(len(kindyn.tree.joints))
-    return [np.array(kindyn.forward_kinematics(body, np.eye(4), still)) for body in frames.layout.bodies]
-
-
-def _owner(frames: Frames, frame: str) -> int:
-    """Return the body of the layout that a frame belongs to.
-
-    Args:
-        frames: with the layout.
-        frame: a link by name.
-    """
-    above = {joint.child: joint.parent for joint in read_urdf(frames.robot.urdf)[1]}
-    while frame not in frames.layout.bodies:
-        frame = above[frame]
-    return frames.layout.bodies.index(frame)
 
 
 _BODIES = (

@@ -75,6 +75,7 @@ class _Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self.errors,
+            start_new_session=True,  # Ctrl-C of a terminal is for the driver; a solve would take it for a wish to stop
             text=True,
             encoding="utf-8",
             env={

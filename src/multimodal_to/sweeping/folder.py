@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -231,8 +230,3 @@ def _fcntl() -> ModuleType | None:
     except ImportError:  # not on Windows, where nothing holds the folder
         return None
     return fcntl
-
-
-def size_of(path: Path) -> int:
-    """Return the bytes of all files below a folder."""
-    return sum(os.path.getsize(file) for file in path.rglob("*") if file.is_file())
