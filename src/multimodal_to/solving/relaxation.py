@@ -59,8 +59,8 @@ def relax(
     Minimises Σ w (s⁺ + s⁻) + ½ κ |x − x₀|² subject to the bounds of x, s⁺, s⁻ ≥ 0 and the terms' bounds on
     g(x) + s⁺ − s⁻, in solver units. The sum of absolute values (l1) puts what has to give way on few rows; κ is small.
     What is asked of the motion, by keyframes, reach, margins and terms of one's own, has w = 1, and physics has
-    `physics`: where that is large, it gives way only where no other row can. With 1 all rows are alike, and a motion that
-    meets all of them is found more surely.
+    `physics`: where that is large, it gives way only where no other row can. With 1 all rows are alike, and a motion
+    that meets all of them is found more surely.
 
     Args:
         problem: from `build`.
