@@ -154,3 +154,16 @@ def test_a_state_and_another_start_contradict_each_other():
         replace(mt.scenarios.landing(), initial_state="first.npz")
     with pytest.raises(ScenarioError, match="initial_knot is of no file"):
         replace(mt.scenarios.landing(), initial_knot=3)
+
+
+def test_a_task_that_is_feasible_is_called_so_and_is_solved_from_the_motion_that_shows_it(folder):
+    mt.scenario_files.save(
+        replace(hop(mt.load_robot(folder / "machines" / "hopper")), robot="machines/hopper"), folder / "hop.toml"
+    )
+    out = folder / "out"
+    options = ("--no-pictures", "-o", out)
+    result = run("solve", folder / "hop.toml", "--explain", "--max-iterations", 150, *options)
+    assert result.returncode == 1
+    assert "explain: nothing has to give way, all rows can be met together" in result.stdout
+    again = run("solve", folder / "hop.toml", "--warm-start", out / "explained.npz", *options)
+    assert again.returncode == 0, again.stdout

@@ -50,7 +50,6 @@ from multimodal_to.scenarios.scenario import Scenario, word
 from multimodal_to.solving import Ipopt, Solution, Status, relax
 from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
-from multimodal_to.solving.relaxation import GIVES_WAY, PHYSICS
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.derived import largest_torques
@@ -290,10 +289,10 @@ def _explain(console: Console, problem: Problem, solution: Solution, solver: Ipo
         solver: whose limits hold.
         folder: of the results.
     """
-    found = relax(problem, solution.trajectory, solver)
-    if not found.status.solved or found.price >= PHYSICS * GIVES_WAY:  # where the solve ended may be a bad place
-        again = relax(problem, solver=solver)
-        found = min(found, again, key=lambda one: (not one.status.solved, one.price))
+    found = relax(problem, solution.trajectory, solver, physics=1.0)
+    if not found.status.solved or found.gives_way:  # some row has to: then what is asked before physics
+        asked = relax(problem, solution.trajectory, solver)
+        found = asked if asked.status.solved or not found.status.solved else found
     spent = f"{found.iterations} iterations in {found.solve_time:.1f} s"
     if not found.status.solved:
         console.print(f"explain: found nothing for certain in {spent}: {found.status.value}", soft_wrap=True)

@@ -47,31 +47,41 @@ class Relaxation(Value):
 
 @checked
 def relax(
-    problem: Problem, start: Trajectory | None = None, solver: Ipopt | None = None, *, terms: Sequence[str] = ()
+    problem: Problem,
+    start: Trajectory | None = None,
+    solver: Ipopt | None = None,
+    *,
+    terms: Sequence[str] = (),
+    physics: float = PHYSICS,
 ) -> Relaxation:
     """Return which terms of a problem have to give way, and by how much, for the others and all bounds to hold.
 
     Minimises Σ w (s⁺ + s⁻) + ½ κ |x − x₀|² subject to the bounds of x, s⁺, s⁻ ≥ 0 and the terms' bounds on
     g(x) + s⁺ − s⁻, in solver units. The sum of absolute values (l1) puts what has to give way on few rows; κ is small.
     What is asked of the motion, by keyframes, reach, margins and terms of one's own, has w = 1, and physics has
-    `PHYSICS`: it gives way only where no other row can.
+    `physics`: where that is large, it gives way only where no other row can. With 1 all rows are alike, and a motion
+    that meets all of them is found more surely.
 
     Args:
         problem: from `build`.
         start: where an ordinary solve ended; by default the start guess.
         solver: whose limits hold, by default `Ipopt()`.
         terms: names of the constraints that may give way; by default all that are not `rigid`.
+        physics: how much more it costs that a row of physics gives way than one of the task.
 
     Raises:
-        InputError: there is no constraint of a name, or the start is a motion of another robot.
+        InputError: there is no constraint of a name, the start is a motion of another robot, or `physics` is not at
+            least 1.
     """
+    if not 1.0 <= physics < np.inf:
+        raise InputError(f"physics is {physics}; expected a number of at least 1")
     solver, started = solver or Ipopt(), time.perf_counter()
     known = tuple(dict.fromkeys((*problem.rows, *problem.bound_rows)))
     for name in terms:
         if name not in known:
             raise InputError(unknown("constraint", name, known))
     rigid = {term.name for term in problem.formulation.constraints if term.rigid}
-    elastic = _Elastic.of(problem, terms or [name for name in known if name not in rigid])
+    elastic = _Elastic.of(problem, terms or [name for name in known if name not in rigid], physics)
     x = problem.guess if start is None else problem.start_from(start)
     x, slacks, statistics = _run(problem, elastic, x, solver)
     amounts = np.zeros(elastic.lower.size)
@@ -101,8 +111,14 @@ class _Elastic:
     x_upper: Array
 
     @classmethod
-    def of(cls, problem: Problem, terms: Sequence[str]) -> _Elastic:
-        """Return the rows of a problem of which those of some terms may give way."""
+    def of(cls, problem: Problem, terms: Sequence[str], physics: float = PHYSICS) -> _Elastic:
+        """Return the rows of a problem of which those of some terms may give way.
+
+        Args:
+            problem: whose rows they are.
+            terms: names of those that may.
+            physics: what those of physics weigh.
+        """
         x_lower, x_upper = problem.box_lower.copy(), problem.box_upper.copy()
         places, first = dict[str, slice](), 0
         for name, some in problem.bound_rows.items():
@@ -113,7 +129,7 @@ class _Elastic:
                 np.minimum.at(x_upper, some.index, some.upper)
         behind = [problem.bound_rows[name] for name in places]
         count, asked = problem.row_lower.size, asked_terms(problem)
-        prices = np.full(count + first, PHYSICS)
+        prices = np.full(count + first, physics)
         for name in terms:
             if name in asked:
                 prices[problem.rows[name].index if name in problem.rows else []] = 1.0
