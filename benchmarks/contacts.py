@@ -9,11 +9,9 @@ the machine.
 from __future__ import annotations
 
 import argparse
-import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from importlib.metadata import files
 from pathlib import Path
 
 import multimodal_to as mt
@@ -33,26 +31,17 @@ def walk() -> Iterator[tuple[str, Robot, mt.Scenario]]:
     yield "given", robot, replace(found, guess_steps=0, gait=plan, contacts=(in_air,))
 
 
-def solo12() -> Robot:
-    """Return Solo12 with the `robot.toml` of the examples."""
-    folder = Path(tempfile.mkdtemp())
-    (folder / "robot.toml").write_text((EXAMPLES / "solo12" / "robot.toml").read_text(encoding="utf-8"))
-    urdf = next(file for file in files("example-robot-data") or [] if file.name == "solo12.urdf")
-    (folder / "solo12.urdf").symlink_to(Path(str(urdf.locate())).resolve())
-    return mt.load_robot(folder)
-
-
 def trot() -> Iterator[tuple[str, Robot, mt.Scenario]]:
     """Give the trot of Solo12; where it is found, its feet skim, and the start guess steps as often."""
-    robot, given = solo12(), mt.scenario_files.load(EXAMPLES / "solo12" / "trot.toml")
+    robot, given = mt.load_robot("solo12"), mt.scenario_files.load(EXAMPLES / "trot.toml")
     yield "found", robot, replace(given, gait=None, guess_steps=8)
     yield "given", robot, given
 
 
 def mixed() -> Iterator[tuple[str, Robot, mt.Scenario]]:
     """Give the trot with three feet given and one found."""
-    robot, given = solo12(), mt.scenario_files.load(EXAMPLES / "solo12" / "trot.toml")
-    free = mt.ContactStretch(of=("FL",), state=mt.ContactState.FREE)
+    robot, given = mt.load_robot("solo12"), mt.scenario_files.load(EXAMPLES / "trot.toml")
+    free = mt.ContactStretch(of=("front_left",), state=mt.ContactState.FREE)
     yield "three feet given, one found", robot, replace(given, contacts=(free,))
 
 

@@ -20,7 +20,7 @@ HEIGHT, COLOURS = 400, 256  # of the snapshots of each scenario
 OF_EXAMPLES = {
     **dict.fromkeys(("turn", "reach", "slope", "sidesteps", "failed-jet", "jump-onto-box"), "ironcub"),
     "side-step": ROOT / "examples" / "hopper",
-    "trot": RESULTS / "trot" / "solo12",
+    "trot": "solo12",
 }
 """The robots of the examples that have a picture, by what their results are called."""
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"

@@ -1,7 +1,5 @@
-"""Contacts that are given: Solo12 trots 0.3 m, as `solo12/trot.toml` says, and what MuJoCo makes of it."""
+"""Contacts that are given: Solo12 trots 0.3 m, as `trot.toml` says, and what MuJoCo makes of it."""
 
-import shutil
-from importlib.metadata import files
 from pathlib import Path
 
 import multimodal_to as mt
@@ -9,15 +7,10 @@ from multimodal_to.replay import write_html
 from multimodal_to.simulation import play, tracking
 from multimodal_to.trajectory.derived import footsteps
 
-here, folder = Path(__file__).parent / "solo12", Path("results/trot")
-(folder / "solo12").mkdir(parents=True, exist_ok=True)
-shutil.copy(here / "robot.toml", folder / "solo12")
-urdf = next(file for file in files("example-robot-data") or [] if file.name == "solo12.urdf")
-(link := folder / "solo12" / "solo12.urdf").unlink(missing_ok=True)
-link.symlink_to(Path(str(urdf.locate())).resolve())  # meshes are found beside the file
-robot = mt.load_robot(folder / "solo12")
-
-trot = mt.scenario_files.load(here / "trot.toml")
+folder = Path("results/trot")
+folder.mkdir(parents=True, exist_ok=True)
+robot = mt.load_robot("solo12")
+trot = mt.scenario_files.load(Path(__file__).parent / "trot.toml")
 problem = mt.build(robot, trot)
 solution = mt.solve(problem)
 print(solution.status.value, "after", solution.iterations, "iterations in", round(solution.solve_time, 1), "s")
