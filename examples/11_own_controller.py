@@ -1,4 +1,4 @@
-"""A controller of one's own: joint servos at the plan's postures and the planned throttle, and nothing that balances."""
+"""A controller of one's own: joint servos at the plan's postures and the planned throttle; nothing balances."""
 
 from pathlib import Path
 
