@@ -75,11 +75,25 @@ class Belief:
     def __init__(self, robot: Robot, plan: Trajectory) -> None:
         self.simulation: SimulationModel
         self.simulation, self.friction = stage(robot, plan)
+        self._scenario = plan.scenario_json
         self._mujoco = mujoco_module()
         self.data: Any = self._mujoco.MjData(self.simulation.model)
         self._of_joints = np.zeros((self.simulation.model.nv, 6 + len(robot.joint_names)))
         self._of_joints[:6, :6] = np.eye(6)
         self._of_joints[:, 6:] = self.simulation.coupling
+
+    @classmethod
+    def of(cls, robot: Robot, plan: Trajectory, before: Belief | None) -> Belief:
+        """Return a belief, by default a new one.
+
+        Args:
+            robot: that moves.
+            plan: its motion.
+            before: what is returned if it is of the same robot and scenario; to build one takes a while.
+        """
+        if before is not None and before.simulation.robot is robot and before._scenario == plan.scenario_json:
+            return before
+        return cls(robot, plan)
 
     @property
     def of_joints(self) -> Array:

@@ -24,7 +24,7 @@ class Flight:
     Args:
         robot: that moves.
         plan: its motion, at whose first knot the simulation starts and which it follows until there is another one.
-        controller: what carries the plans out; by default the `WholeBodyController`.
+        controller: what carries the plans out; by default the `ServoController`.
         push: what pushes the robot, if anything does.
         torque_limits: clip the torque of each joint's motor at its effort limit.
 

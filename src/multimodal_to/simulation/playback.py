@@ -76,7 +76,7 @@ def play(
     Args:
         robot: that moves.
         plan: its motion, with the scenario that it was solved for where it keeps one.
-        controller: what carries it out; by default the `WholeBodyController`.
+        controller: what carries it out; by default the `ServoController`.
         disturbance: how the simulated robot differs from that of the plan; by default it does not.
         torque_limits: clip the torque of each joint's motor at its effort limit.
 

@@ -64,8 +64,8 @@ class ServoController:
             since: when the plan's first knot is or was, since the simulation's start [s].
         """
         first = self._belief is None
+        self._belief = Belief.of(robot, plan, self._belief)
         self._robot, self._since = robot, since
-        self._belief = Belief(robot, plan)
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
         units, gains = Units.of(robot), self._gains
         self._balance = Balance(gains=gains, units=units, inertia=inertia(robot), friction=self._belief.friction)

@@ -158,7 +158,7 @@ class WholeBodyController:
             since: when the plan's first knot is or was, since the simulation's start [s].
         """
         first, self._robot, self._since = self._robot is None, robot, since
-        self._units, self._belief = Units.of(robot), Belief(robot, plan)
+        self._units, self._belief = Units.of(robot), Belief.of(robot, plan, None if first else self._belief)
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
         self._feet = PlannedFeet.along(self._belief, self._plan, PERIOD)
         self._feedback = Feedback(self._belief, self._plan, PERIOD, self._gains.look_ahead)
