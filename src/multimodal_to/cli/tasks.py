@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from multimodal_to.cli.common import chosen
+from multimodal_to.cli.common import chosen, of_others
 from multimodal_to.errors import InputError, ScenarioError
 from multimodal_to.ocp import Formulation
 from multimodal_to.scenarios.data import stored
@@ -53,7 +53,7 @@ def given(
     if resume is None:
         if name is None:
             raise InputError("nothing to solve; expected the NAME of a scenario, or --resume FILE")
-        start = None if warm_start is None else Trajectory.load(warm_start)
+        start = None if warm_start is None else _motion(warm_start, robot)
         formulation = Formulation.paper() if paper else Formulation.executable()
         return Task(
             scenario=chosen(name, settings, paper=paper), robot=robot or "ironcub", formulation=formulation, start=start
@@ -84,6 +84,17 @@ def given(
         )
     formulation = Formulation.of_rule(start.rule)
     return Task(scenario=scenario, robot=robot or start.robot, formulation=formulation, start=start)
+
+
+def _motion(file: Path, robot: str) -> Trajectory:
+    """Return the motion of a file, also of another program's where the robot is named.
+
+    Args:
+        file: of the motion.
+        robot: name or folder; empty where it is not named.
+    """
+    others = of_others(file, robot) if robot else None
+    return Trajectory.load(file) if others is None else others[1]
 
 
 def free_checkpoint(folder: Path, resume: Path | None, console: Console) -> Path:
