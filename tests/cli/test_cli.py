@@ -102,6 +102,7 @@ COMMANDS = (
     "doctor",
     "solve",
     "reproduce",
+    "sweep",
     "plot",
     "replay",
     "report",

@@ -18,10 +18,12 @@ from multimodal_to.models.robot import JointLimits, Posture, Robot
 from multimodal_to.replay import MeshWarning
 from multimodal_to.replay.dress import read_dress, zero_poses
 from multimodal_to.replay.meshes import Part, find_mesh, load_parts, shaded
+from multimodal_to.replay.page import page
 from multimodal_to.replay.visuals import FACES, appearance
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 from multimodal_to.trajectory.derived import frame_poses
 from places import example_robots
+from synthetic import take_off
 
 IRONCUB = Path(__file__).parents[2] / "robots" / "ironcub"
 VISUAL = '<visual><geometry><mesh filename="{}" scale="{}"/></geometry></visual>'
@@ -404,3 +406,8 @@ def test_a_robot_of_example_robot_data_replays_with_its_meshes(name, tmp_path):
         page = replay.write_html(robot, at_home(robot), tmp_path / "robot.html")
     assert sum(visual.part is not None for visual in look.visuals) > 10
     assert page.stat().st_size < 15e6
+
+
+@needs_icub
+def test_the_page_of_the_dressed_ironcub_is_small_enough_to_send(ironcub):
+    assert len(page(ironcub, take_off(ironcub))) < 3e6

@@ -97,7 +97,7 @@ def robot_for(scenario: Scenario, option: str, *, file: str = "") -> str:
 
 def loaded(file: Path, robot: str) -> tuple[Robot, Trajectory]:
     """Return a trajectory with its robot; a file of bare arrays, or of another program, needs the robot named."""
-    if robot and (moved := _of_others(file, robot)) is not None:
+    if robot and (moved := of_others(file, robot)) is not None:
         return moved
     trajectory = Trajectory.load(file)
     if not robot and (Path(trajectory.robot).name != trajectory.robot or trajectory.robot in ("", "..")):
@@ -110,7 +110,7 @@ def loaded(file: Path, robot: str) -> tuple[Robot, Trajectory]:
     return the_robot, trajectory
 
 
-def _of_others(file: Path, robot: str) -> tuple[Robot, Trajectory] | None:
+def of_others(file: Path, robot: str) -> tuple[Robot, Trajectory] | None:
     """Return a motion of a tracker or a simulator, or of bare arrays, with its robot; None for the library's own files.
 
     Args:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from multimodal_to.cli.common import chosen, robot_for
+from multimodal_to.cli.common import chosen, of_others, robot_for
 from multimodal_to.errors import InputError, ScenarioError
 from multimodal_to.models.robot import load_robot
 from multimodal_to.models.state import State
@@ -59,7 +59,7 @@ def given(
     if resume is None:
         if name is None:
             raise InputError("nothing to solve; expected the NAME of a scenario, or --resume FILE")
-        start = None if warm_start is None else Trajectory.load(warm_start)
+        start = None if warm_start is None else _motion(warm_start, robot)
         formulation = Formulation.paper() if paper else Formulation.executable()
         asked = chosen(name, settings, paper=paper)
         whose = robot_for(asked, robot, file="" if quiet else name)
@@ -95,6 +95,17 @@ def given(
         )
     formulation = Formulation.of_rule(start.rule)
     return Task(scenario=scenario, robot=whose, formulation=formulation, start=start, initial=initial)
+
+
+def _motion(file: Path, robot: str) -> Trajectory:
+    """Return the motion of a file, also of another program's where the robot is named.
+
+    Args:
+        file: of the motion.
+        robot: name or folder; empty where it is not named.
+    """
+    others = of_others(file, robot) if robot else None
+    return Trajectory.load(file) if others is None else others[1]
 
 
 def free_checkpoint(folder: Path, resume: Path | None, console: Console) -> Path:
