@@ -21,7 +21,7 @@ class Following:
     def command(self, state, time):
         """Return what motors and turbines shall do; `state` is the robot as it is now."""
         now = self.plan.time[0] + np.clip(time - self.since, 0.0, self.plan.duration)
-        wanted = resample(self.plan, np.array([now]))
+        wanted = resample(self.plan, [now, now + 1e-6])  # a trajectory has two knots at least
         place, speed = wanted.joint_positions[:, 0], wanted.joint_velocities[:, 0]
         servos = Servos(positions=place, velocities=speed, stiffness=300.0 * self.one, damping=10.0 * self.one)
         return Command(torques=0.0 * self.one, throttle=wanted.throttle[:, 0], servos=servos)

@@ -56,6 +56,8 @@ UNCHECKED = {
     "ocp.terms.Constraint": "by problems",
     "ocp.terms.Cost": "by problems",
     "ocp.terms.Within": "by problems",
+    "simulation.controller.Controller": "a protocol, for others to fill",
+    "simulation.controller.drawn": "on dataclasses of any kind",
     "simulation.stabiliser": "in every control step of a simulation",
     "solving.ipopt.Ipopt": "by `solve`",
     "solving.solver": "protocols, for others to fill",

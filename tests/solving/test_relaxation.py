@@ -82,7 +82,7 @@ def test_only_the_terms_that_may_give_way_do_and_the_others_hold(too_high, solut
     met = too_high.largest_violations(too_high.start_from(relaxation.trajectory))
     assert max(amount for name, amount in met.items() if name not in chosen) < 1e-5
     for some in relaxation.gives_way:
-        assert some.amount == pytest.approx(met[some.name], abs=1e-6)
+        assert some.amount == pytest.approx(met[some.name], abs=1e-5)
 
 
 def test_a_term_that_cannot_make_up_for_it_is_not_called_the_answer(too_high, solution):

@@ -235,13 +235,15 @@ def _nearest(task: Task, one: Placed, targets: Mapping[str, Mapping[str, float]]
 
 
 def yaw_without_moment(task: Task) -> Iterator[Symptom]:
-    """Say where no force turns the robot about the vertical in the air: jets on the base that all push along it."""
+    """Say where no force turns the robot about the vertical in the air: jets without drag on the base, all along it."""
     robot, tree = task.robot, task.robot.kindyn.tree
-    if not robot.jets or not task.hovers or any(tree.frame(jet.frame).body != BASE for jet in robot.jets):
+    if not robot.jets or not task.hovers or any(jet.drag or tree.frame(jet.frame).body != BASE for jet in robot.jets):
         return
     up = robot.upright.base_transform[:3, :3].T @ robot.up
     pushes = [np.array(tree.frame(jet.frame).rotation)[:, 2] for jet in robot.jets]
-    if max(float(np.linalg.norm(np.cross(push, up))) for push in pushes) > _PARALLEL:
+    if max(float(np.linalg.norm(np.cross(push, up))) for push in pushes) > _PARALLEL or any(
+        jet.drag for jet in robot.jets
+    ):
         return
     asked = [one.label for one in _in_order(task) if one.knot and one.keyframe.yaw]
     found = "the jets all push along the vertical, and no force turns the robot about it while it is in the air"

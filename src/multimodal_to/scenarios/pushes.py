@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from multimodal_to.arguments import check_fields
+from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import ScenarioError, shown
 from multimodal_to.trajectory import rules
 
@@ -41,6 +41,7 @@ class KnownPush:
                 "shares of the horizon"
             )
 
+    @checked
     def knots(self, knots: int, rule: str) -> range:
         """Return at which knots the force acts, like a contact force, so that it acts over the whole stretch.
 

@@ -12,6 +12,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.simulation.model import SimulationModel, mujoco_module
@@ -72,6 +73,7 @@ class Belief:
         plan: its motion, with the scenario that it keeps.
     """
 
+    @checked
     def __init__(self, robot: Robot, plan: Trajectory) -> None:
         self.simulation: SimulationModel
         self.simulation, self.friction = stage(robot, plan)
@@ -155,6 +157,7 @@ def drawn(gains: Gains, rng: np.random.Generator, spread: float) -> Gains:
     return replace(gains, **changes)  # type: ignore[type-var]
 
 
+@checked
 def row_of(time: float, period: float, plan: Reference) -> int:
     """Return the row of a reference that holds at a time; the first before it begins, the last after its end.
 

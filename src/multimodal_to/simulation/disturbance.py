@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.urdf import read_urdf
-from multimodal_to.arguments import check_fields, vector
+from multimodal_to.arguments import check_fields, checked, vector
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Vector3
@@ -42,6 +42,7 @@ class Push:
         if not (np.isfinite([*self.force, self.start, self.duration]).all() and self.duration > 0.0):
             raise InputError(f"the push is {self}; expected finite numbers and a duration above zero")
 
+    @checked
     def at(self, time: float) -> Vector3:
         """Return its force at a time since the simulation's start [N]."""
         acts = self.start - 1e-9 <= time < self.start + self.duration - 1e-9
@@ -70,6 +71,7 @@ class Disturbance:
         if not (np.isfinite(numbers).all() and min(numbers) >= 0.0):
             raise InputError(f"the disturbance is {self}; expected finite numbers of at least zero")
 
+    @checked
     def apply(self, simulation: SimulationModel) -> None:
         """Change masses and friction of a model; the rest is for who simulates it."""
         model: Any = simulation.model
@@ -81,11 +83,13 @@ class Disturbance:
         mujoco = mujoco_module()
         mujoco.mj_setConst(model, mujoco.MjData(model))
 
+    @checked
     def of_motors(self, robot: Robot) -> np.ndarray:
         """Return by which each motor's torque is multiplied, (n,)."""
         return np.array([self.motor_gains.get(name, 1.0) for name in robot.joint_names])
 
 
+@checked
 def draw(
     robot: Robot, duration: float, rng: np.random.Generator, *, push: float | None = None, noise: bool = False
 ) -> Disturbance:

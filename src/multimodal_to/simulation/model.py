@@ -99,6 +99,7 @@ class SimulationModel:
         data.qvel[:3], data.qvel[3:6] = velocity[:3], turn.reshape(3, 3).T @ velocity[3:]
         data.qvel[6:] = (self.coupling @ joint_velocities)[6:]
 
+    @checked
     def set_servos(self, stiffness: Array, damping: Array) -> None:
         """Let each joint's motor add −K s − D ṡ to its control; MuJoCo integrates the damping implicitly.
 
@@ -338,6 +339,7 @@ def _hold(mujoco: ModuleType, body: Any, joint: Joint, value: float) -> None:
     body.quat = turned
 
 
+@checked
 def body_name(robot: Robot, link: str) -> str:
     """Return what the body of a link is called: as the link, or otherwise where MuJoCo's own world is called so."""
     return _free(link, robot.kindyn.frame_names) if link == "world" else link

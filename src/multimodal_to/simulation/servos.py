@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.simulation.controller import Belief, Command, Servos, row_of
@@ -39,6 +40,7 @@ class ServoController:
         stabilise: let feedback correct thrusts, contact forces and joints; else turbines get the planned throttle.
     """
 
+    @checked
     def __init__(self, gains: ServoGains | None = None, *, stabilise: bool = True) -> None:
         self._gains, self._stabilise = gains or ServoGains(), stabilise
         self._since = 0.0
@@ -55,6 +57,7 @@ class ServoController:
         """Return the time between two commands [s]."""
         return PERIOD
 
+    @checked
     def reset(self, robot: Robot, plan: Trajectory, since: float) -> None:
         """Follow a plan from now on; what the joints have been shifted by stays.
 
@@ -78,6 +81,7 @@ class ServoController:
         if first:
             self._shift = np.zeros(count)
 
+    @checked
     def command(self, state: State, time: float) -> Command:
         """Return what the robot shall do.
 
@@ -128,6 +132,7 @@ class ServoController:
         return np.asarray(simulation.coupling.T @ total)
 
 
+@checked
 def inertia(robot: Robot) -> Array:
     """Return the robot's inertia about its CoM at home, in the axes of its base [kg m²], (3, 3)."""
     pose, joints = np.eye(4), robot.home.joint_positions

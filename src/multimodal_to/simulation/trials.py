@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.simulation.controller import Controller, drawn
@@ -25,11 +26,13 @@ Make = Callable[[np.random.Generator | None], Controller]
 """What makes the controller of a trial: with gains drawn from the generator; without one, as they are."""
 
 
+@checked
 def servos(rng: np.random.Generator | None = None) -> Controller:
     """Return the `ServoController`; with a generator its gains are each drawn within ±20 %."""
     return ServoController(ServoGains() if rng is None else drawn(ServoGains(), rng, GAIN_SPREAD))
 
 
+@checked
 def whole_body(rng: np.random.Generator | None = None) -> Controller:
     """Return the `WholeBodyController`; with a generator its gains are each drawn within ±20 %."""
     return WholeBodyController(WholeBodyGains() if rng is None else drawn(WholeBodyGains(), rng, GAIN_SPREAD))
@@ -37,7 +40,7 @@ def whole_body(rng: np.random.Generator | None = None) -> Controller:
 
 CONTROLLERS: Mapping[str, Make] = FrozenMapping({"servos": servos, "whole-body": whole_body})
 """The controllers of this library by name; the first one is what `play` and `simulate` use."""
-default_controller: Make = servos
+DEFAULT_CONTROLLER: Make = servos
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,13 +88,14 @@ class Draws:
             raise InputError(f"the draws are {self}; expected a seed and a push of at least zero")
 
 
+@checked
 def run_trial(
     robot: Robot,
     plan: Trajectory,
     number: int | None,
     draws: Draws | None = None,
     *,
-    make: Make = default_controller,
+    make: Make = DEFAULT_CONTROLLER,
     torque_limits: bool = True,
 ) -> tuple[Playback, Trial]:
     """Play a plan back once and return what happened and what came of it.
@@ -129,13 +133,14 @@ def _trial(playback: Playback, number: int, disturbance: Disturbance | None) -> 
     )
 
 
+@checked
 def run_trials(
     robot: Robot,
     plan: Trajectory,
     numbers: Sequence[int],
     draws: Draws | None = None,
     *,
-    make: Make = default_controller,
+    make: Make = DEFAULT_CONTROLLER,
     torque_limits: bool = True,
     jobs: int = 1,
 ) -> Iterator[Trial]:
@@ -164,7 +169,8 @@ def run_trials(
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def gains_alone(robot: Robot, plan: Trajectory, number: int, seed: int, *, make: Make = default_controller) -> Trial:
+@checked
+def gains_alone(robot: Robot, plan: Trajectory, number: int, seed: int, *, make: Make = DEFAULT_CONTROLLER) -> Trial:
     """Play a plan back once with other gains of the controller, and nothing else disturbed.
 
     Args:

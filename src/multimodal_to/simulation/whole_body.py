@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.arguments import checked
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
@@ -128,6 +129,7 @@ class WholeBodyController:
         weights: how much each task counts.
     """
 
+    @checked
     def __init__(self, gains: WholeBodyGains | None = None, weights: Weights | None = None) -> None:
         self._gains, self._weights = gains or WholeBodyGains(), weights or Weights()
         self._since = 0.0
@@ -149,6 +151,7 @@ class WholeBodyController:
         """Return the time between two commands [s]."""
         return PERIOD
 
+    @checked
     def reset(self, robot: Robot, plan: Trajectory, since: float) -> None:
         """Follow a plan from now on; what the joints have been shifted by stays.
 
@@ -185,6 +188,7 @@ class WholeBodyController:
             found |= np.abs(self._jacobian(middle, body)[:, 6:]).max(axis=0) > 1e-9
         return found
 
+    @checked
     def command(self, state: State, time: float) -> Command:
         """Return what the robot shall do.
 

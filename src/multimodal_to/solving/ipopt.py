@@ -164,11 +164,11 @@ class Ipopt:
                 with nullcontext() if structured else machine.memory_kept():
                     end, statistics = _run(problem, x, options, _Watcher(problem, watch, iterations, which))
                 failure = stages.failure(structured, str(statistics["return_status"]))
-            iterations += int(statistics["iter_count"])
-            if failure:  # the same pass once more
+            if failure:  # the same pass once more; how far this one got is not always known
                 solver = replace(self, linear_solver=linear_solvers.MUMPS)
                 facts = {"linear_solver": linear_solvers.MUMPS, "linear_solver_refused": failure}
                 continue
+            iterations += int(statistics["iter_count"])
             x = end
             passes.pop(0)
             message = str(statistics["return_status"])

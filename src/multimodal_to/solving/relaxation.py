@@ -231,7 +231,7 @@ def _relaxed(problem: Problem, elastic: _Elastic, start: Array) -> tuple[dict[st
     spread = cs.DM(cs.Sparsity(all_rows, slack_count, list(range(slack_count + 1)), elastic.chosen.tolist()), 1.0)
     pick = cs.DM.triplet(list(range(bounds.size)), bounds.tolist(), cs.DM.ones(bounds.size), bounds.size, count)
     added = cs.mtimes(spread, up - down)
-    weights = cs.DM(elastic.weights)
+    weights = cs.DM(elastic.weights / elastic.weights.max(initial=1.0))  # large multipliers hide what κ holds
     objective = cs.dot(weights, up + down) + 0.5 * _NEARNESS * cs.sumsqr(x - start)
     gradient = cs.vertcat(_NEARNESS * (x - start), weights, weights)
     g, jacobian = problem.nlp.jacobian(x, p)
