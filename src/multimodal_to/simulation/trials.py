@@ -40,7 +40,6 @@ def whole_body(rng: np.random.Generator | None = None) -> Controller:
 
 CONTROLLERS: Mapping[str, Make] = FrozenMapping({"servos": servos, "whole-body": whole_body})
 """The controllers of this library by name; the first one is what `play` and `simulate` use."""
-DEFAULT_CONTROLLER: Make = servos
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +94,7 @@ def run_trial(
     number: int | None,
     draws: Draws | None = None,
     *,
-    make: Make = DEFAULT_CONTROLLER,
+    make: Make = servos,
     torque_limits: bool = True,
 ) -> tuple[Playback, Trial]:
     """Play a plan back once and return what happened and what came of it.
@@ -140,7 +139,7 @@ def run_trials(
     numbers: Sequence[int],
     draws: Draws | None = None,
     *,
-    make: Make = DEFAULT_CONTROLLER,
+    make: Make = servos,
     torque_limits: bool = True,
     jobs: int = 1,
 ) -> Iterator[Trial]:
@@ -170,7 +169,7 @@ def run_trials(
 
 
 @checked
-def gains_alone(robot: Robot, plan: Trajectory, number: int, seed: int, *, make: Make = DEFAULT_CONTROLLER) -> Trial:
+def gains_alone(robot: Robot, plan: Trajectory, number: int, seed: int, *, make: Make = servos) -> Trial:
     """Play a plan back once with other gains of the controller, and nothing else disturbed.
 
     Args:
