@@ -16,7 +16,7 @@ from multimodal_to.models.contact import DESCENT_RATE
 from multimodal_to.models.sole import PRESSURE_SLACK, soles
 from multimodal_to.ocp import costs, margins
 from multimodal_to.ocp.flights import flights, thrown
-from multimodal_to.ocp.guess import base_transform, contact_positions, standing_posture, start_guess
+from multimodal_to.ocp.guess import contact_positions, standing_posture, start_guess
 from multimodal_to.ocp.integration import BACKWARD_EULER, LEAPFROG, Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
@@ -437,5 +437,5 @@ def test_the_guess_of_a_posture_puts_its_contact_points_where_the_feet_are(ironc
     for knot in (0, scenario.knots // 2):
         posture = replace(standing, base_position=view["base_position"][:, knot])
         assert contact_positions(robot, posture) == pytest.approx(view["contact_positions"][:, knot], abs=1e-6)
-        com = robot.kindyn.CoM_position(base_transform(posture), posture.joint_positions)
+        com = robot.kindyn.CoM_position(posture.base_transform, posture.joint_positions)
         assert np.array(com).ravel() == pytest.approx(view["com_position"][:, knot], abs=1e-7)

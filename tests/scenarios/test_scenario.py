@@ -11,7 +11,7 @@ from multimodal_to import scenario_files, scenarios
 from multimodal_to.errors import ModelError, ScenarioError
 from multimodal_to.models.terrain import FlatGround, Plane, Stairs, heights_below
 from multimodal_to.ocp import build
-from multimodal_to.ocp.guess import base_transform, contact_positions, standing_posture
+from multimodal_to.ocp.guess import contact_positions, standing_posture
 from multimodal_to.ocp.variables import Layout, ranges
 from multimodal_to.scenarios import Margins, Weights
 from multimodal_to.scenarios.data import from_dict, to_json
@@ -168,7 +168,7 @@ def test_a_deep_crouch_is_upright_as_long_as_there_is_a_posture(ironcub, height)
 
 def com_of(robot, posture):
     """The CoM of a posture in the world [m]."""
-    return np.array(robot.kindyn.CoM_position(base_transform(posture), posture.joint_positions)).ravel()
+    return np.array(robot.kindyn.CoM_position(posture.base_transform, posture.joint_positions)).ravel()
 
 
 # ------------------------------------------------------------------------------------------ margins

@@ -16,8 +16,8 @@ from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.schedule import Flags
-from multimodal_to.ocp.terms import Constraint, Where, at_least, equal
-from multimodal_to.trajectory.quantities import XYZ, row_labels
+from multimodal_to.ocp.terms import Constraint, Where, at_least, each, equal
+from multimodal_to.trajectory.quantities import XYZ
 
 ON_GROUND = 1e-5
 """Largest height of a contact point that stands [m]: a sole has more corners than a plane needs."""
@@ -206,14 +206,6 @@ def _in_place_labels(parameters: Parameters) -> tuple[str, ...]:
     return tuple(labels)
 
 
-def _names(parameters: Parameters) -> tuple[str, ...]:
-    return row_labels(parameters.robot, "contact", ("",))
-
-
-def _by_axis(parameters: Parameters) -> tuple[str, ...]:
-    return row_labels(parameters.robot, "contact", XYZ)
-
-
 def _gives(parameters: Parameters) -> bool:
     return bool(parameters.scenario.contacts or parameters.scenario.gait)
 
@@ -225,7 +217,7 @@ GIVEN_OFF = Constraint(
     unit="N",
     holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
     scale=50.0,
-    labels=_by_axis,
+    labels=each("contact", *XYZ),
     when=_gives,
     present=_unloaded,
 )
@@ -234,7 +226,7 @@ GIVEN_ON = Constraint(
     value=constraints.heights,
     within=equal(0.5 * ON_GROUND),  # so that the other corners of a sole are in the middle of their range
     unit="m",
-    labels=_names,
+    labels=each("contact"),
     when=_gives,
     rigid=True,
     present=held,

@@ -9,9 +9,8 @@ from multimodal_to.adam.spatial import SX
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.schedule import Flags
-from multimodal_to.ocp.terms import Constraint, Where, equal
+from multimodal_to.ocp.terms import Constraint, Where, each, equal
 from multimodal_to.scenarios.failures import failing_knots
-from multimodal_to.trajectory.quantities import row_labels
 
 
 def failed(parameters: Parameters, *, at_start: bool) -> Flags:
@@ -52,10 +51,6 @@ def _gone_out(parameters: Parameters) -> Flags:
     return failed(parameters, at_start=False)
 
 
-def _names(parameters: Parameters) -> tuple[str, ...]:
-    return row_labels(parameters.robot, "jet", ("",))
-
-
 def _some_fail(parameters: Parameters) -> bool:
     return bool(parameters.scenario.failures)
 
@@ -67,7 +62,7 @@ NEVER_LIT = Constraint(
     unit="N",
     holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
     scale=50.0,
-    labels=_names,
+    labels=each("jet"),
     when=_some_fail,
     present=_never_lit,
 )
@@ -78,7 +73,7 @@ GONE_OUT = Constraint(
     unit="%",
     holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
     scale=50.0,
-    labels=_names,
+    labels=each("jet"),
     when=_some_fail,
     present=_gone_out,
 )

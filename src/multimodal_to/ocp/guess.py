@@ -121,17 +121,11 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
 
 def contact_positions(robot: Robot, posture: Posture) -> Array:
     """Return the contact points of a posture in the world [m], (3 contacts,)."""
-    transform = base_transform(posture)
     points = [
-        np.array(robot.kindyn.forward_kinematics(name, transform, posture.joint_positions))[:3, 3]
+        np.array(robot.kindyn.forward_kinematics(name, posture.base_transform, posture.joint_positions))[:3, 3]
         for name in robot.contact_names
     ]
     return np.concatenate(points) if points else np.zeros(0)
-
-
-def base_transform(posture: Posture) -> Array:
-    """Return w_H_base of a posture, (4, 4)."""
-    return posture.base_transform
 
 
 def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Layout) -> Array:
@@ -250,7 +244,6 @@ def _ground(scenario: Scenario, points: Array) -> Array:
 
 def _set_jets(robot: Robot, scenario: Scenario, view: dict[str, Array], flown: Array) -> None:
     """Let all jets that have not failed push alike, as much as their limits allow."""
-    interval = 0.5 * (scenario.interval_min + scenario.interval_max)
     works = np.ones((len(robot.jets), scenario.knots + 1))
     for row, knot in failing_knots(scenario.failures, robot.jet_names, scenario.knots).items():
         works[row, knot:] = 0.0
@@ -259,7 +252,7 @@ def _set_jets(robot: Robot, scenario: Scenario, view: dict[str, Array], flown: A
         thrust = np.minimum(flown * robot.weight * shares[index], jet.thrust_max)
         throttle = [jet.model.steady_throttle(value) for value in thrust]
         view["thrust"][index] = thrust
-        view["thrust_rate"][index, 1:] = np.diff(thrust) / interval
+        view["thrust_rate"][index, 1:] = np.diff(thrust) / interval(scenario)
         view["throttle"][index] = np.clip(throttle, jet.throttle_min, jet.throttle_max)
 
 

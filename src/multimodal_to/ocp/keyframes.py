@@ -24,7 +24,7 @@ from multimodal_to.ocp.contacts import ON_GROUND
 from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
-from multimodal_to.ocp.paper import UPRIGHT, UPRIGHT_FIRST, each
+from multimodal_to.ocp.paper import UPRIGHT, UPRIGHT_FIRST
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import (
     Constraint,
@@ -38,6 +38,7 @@ from multimodal_to.ocp.terms import (
     at_least,
     at_most,
     between,
+    each,
     equal,
 )
 from multimodal_to.ocp.variables import Bounds

@@ -24,12 +24,12 @@ from multimodal_to.ocp.terms import (
     IntervalFunction,
     JointUnits,
     KnotFunction,
-    Labels,
     Units,
     Where,
     at_least,
     at_most,
     between,
+    each,
     equal,
 )
 from multimodal_to.scenarios.scenario import Start, Terminal
@@ -40,22 +40,6 @@ UPRIGHT = 1e-3
 
 FORCE = 50.0
 """Size of a force that the solver takes for one [N]."""
-
-
-@dataclass(frozen=True)
-class _Each:
-    """The labels of rows that are repeated for each "joint", "contact" or "jet"."""
-
-    of: str
-    axes: tuple[str, ...]
-
-    def __call__(self, parameters: Parameters) -> tuple[str, ...]:
-        return row_labels(parameters.robot, self.of, self.axes)
-
-
-def each(of: str, *axes: str) -> Labels:
-    """Return the labels of rows that are repeated for each "joint", "contact" or "jet"."""
-    return _Each(of, axes or ("",))
 
 
 def _lagging_jets(parameters: Parameters) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.state import State
 from multimodal_to.ocp import given, keyframes
+from multimodal_to.ocp.flights import interval
 from multimodal_to.ocp.guess import start_guess
 from multimodal_to.ocp.problem import BoundSet, Problem, RowSet
 from multimodal_to.ocp.stages import Held, collect
@@ -161,5 +162,5 @@ def guessed(robot: Robot, scenario: Scenario, posture: Posture, layout: Layout, 
         layout: of the variables of a knot.
         scale: of all variables.
     """
-    middle = 0.5 * (scenario.interval_min + scenario.interval_max)
-    return np.append(start_guess(robot, scenario, posture, layout).ravel(order="F"), middle) / scale
+    columns = start_guess(robot, scenario, posture, layout).ravel(order="F")
+    return np.append(columns, interval(scenario)) / scale

@@ -24,6 +24,7 @@ from multimodal_to.models.joint_units import either, joint_units
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
+from multimodal_to.trajectory.quantities import row_labels
 
 KnotFunction = Callable[[Knot, Parameters], SX]
 IntervalFunction = Callable[[Interval, Parameters], SX]
@@ -39,6 +40,22 @@ Present = Callable[[Parameters], NDArray[np.bool_]]
 
 Units = str | tuple[str, ...] | Callable[[Parameters], tuple[str, ...]]
 """The unit of a term's rows, of each of them, or a function of the parameters where the robot says which they have."""
+
+
+@dataclass(frozen=True)
+class _Each:
+    """The labels of rows that are repeated for each "joint", "contact" or "jet"."""
+
+    of: str
+    axes: tuple[str, ...]
+
+    def __call__(self, parameters: Parameters) -> tuple[str, ...]:
+        return row_labels(parameters.robot, self.of, self.axes)
+
+
+def each(of: str, *axes: str) -> Labels:
+    """Return the labels of rows that are repeated for each "joint", "contact" or "jet"."""
+    return _Each(of, axes or ("",))
 
 
 @dataclass(frozen=True)

@@ -131,6 +131,20 @@ class Belief:
         place = plan.base_position[step], quaternion[[1, 2, 3, 0]], plan.joints[step]
         self.simulation.set_state(self.data, *place, np.zeros(6), rest)
 
+    def of_thrusts(self, thrust: Array) -> Array:
+        """Return J_Tᵀ T of thrusts and of the drag of their rotors, in MuJoCo's velocities, (nv,).
+
+        Args:
+            thrust: T of each jet [N], (jets,).
+        """
+        model, data = self.simulation.model, self.data
+        jacobian, turning, total = np.zeros((3, model.nv)), np.zeros((3, model.nv)), np.zeros(model.nv)
+        for site, jet, size in zip(self.simulation.jets, self.simulation.robot.jets, thrust, strict=True):
+            self._mujoco.mj_jacSite(model, data, jacobian, turning, site)
+            axis = -data.site_xmat[site].reshape(3, 3)[:, 2]
+            total += (jacobian + jet.drag * turning).T @ axis * size
+        return total
+
     def mass_matrix(self) -> Array:
         """Return M in (ṗ, ω in the base's axes, ṡ), (6 + n, 6 + n)."""
         full = np.zeros((self.simulation.model.nv,) * 2)

@@ -74,10 +74,7 @@ class ServoController:
         self._balance = Balance(gains=gains, units=units, inertia=inertia(robot), friction=self._belief.friction)
         self._feedback = Feedback(self._belief, self._plan, PERIOD, gains.look_ahead)
         count = len(robot.joint_names)
-        self._servo = (
-            np.full(count, gains.stiffness * units.moment),
-            np.full(count, gains.damping * units.moment / units.frequency),
-        )
+        self._servo = units.servo(count, gains.stiffness, gains.damping)
         if first:
             self._shift = np.zeros(count)
 
@@ -119,12 +116,8 @@ class ServoController:
         """
         assert self._belief is not None
         mujoco, data, simulation = mujoco_module(), self._belief.data, self._belief.simulation
-        jacobian, turning = np.zeros((3, simulation.model.nv)), np.zeros((3, simulation.model.nv))
-        total = np.zeros(simulation.model.nv)
-        for index, (site, jet) in enumerate(zip(simulation.jets, self._robot.jets, strict=True)):
-            mujoco.mj_jacSite(simulation.model, data, jacobian, turning, site)
-            axis = -data.site_xmat[site].reshape(3, 3)[:, 2]
-            total += (jacobian + jet.drag * turning).T @ axis * (state.thrust[index] - self._plan.thrust[step, index])
+        total = self._belief.of_thrusts(state.thrust - self._plan.thrust[step])
+        jacobian = np.zeros((3, simulation.model.nv))
         for index, force in enumerate(forces):
             if force.any():
                 mujoco.mj_jacGeom(simulation.model, data, jacobian, None, simulation.points[index])

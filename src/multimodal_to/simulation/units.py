@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
 
 EARTH = 9.81  # what counts as the strength of gravity where there is none [m/s²]
@@ -38,3 +39,13 @@ class Units:
     def moment(self) -> float:
         """Return m g L [N m]."""
         return self.force * self.length
+
+    def servo(self, count: int, stiffness: float, damping: float) -> tuple[Array, Array]:
+        """Return K [N m/rad] and D [N m s/rad] of joints' servos, (count,) each.
+
+        Args:
+            count: of joints.
+            stiffness: K [m g L/rad].
+            damping: D [m g L √(L/g)/rad].
+        """
+        return np.full(count, stiffness * self.moment), np.full(count, damping * self.moment / self.frequency)

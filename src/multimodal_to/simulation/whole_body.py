@@ -170,10 +170,7 @@ class WholeBodyController:
         self._ground = frame_function(surface).map(len(robot.contacts)) if robot.contacts else None
         self._legs = self._joints_of_feet()
         count, units = len(robot.joint_names), self._units
-        self._servo = (
-            np.full(count, self._gains.stiffness * units.moment),
-            np.full(count, self._gains.damping * units.moment / units.frequency),
-        )
+        self._servo = units.servo(count, self._gains.stiffness, self._gains.damping)
         if first:
             self._shift, self._torques = np.zeros(count), np.zeros(count)
             self._near = np.full(len(robot.feet), -np.inf)  # when each foot was near the ground last [s]
@@ -241,13 +238,7 @@ class WholeBodyController:
 
     def _of_thrusts(self, state: State) -> Array:
         """Return J_Tᵀ T, (6 + n,)."""
-        simulation, data = self._belief.simulation, self._belief.data
-        jacobian, turning = np.zeros((3, simulation.model.nv)), np.zeros((3, simulation.model.nv))
-        total = np.zeros(simulation.model.nv)
-        for site, jet, thrust in zip(simulation.jets, simulation.robot.jets, state.thrust, strict=True):
-            mujoco_module().mj_jacSite(simulation.model, data, jacobian, turning, site)
-            total -= thrust * (data.site_xmat[site].reshape(3, 3)[:, 2] @ (jacobian + jet.drag * turning))
-        return np.asarray(total @ self._belief.of_joints)
+        return np.asarray(self._belief.of_thrusts(state.thrust) @ self._belief.of_joints)
 
     def _feet_and_contacts(self, step: int, time: float) -> tuple[list[_Task], _Contacts]:
         """Return the tasks of the feet and which points may push."""
