@@ -136,12 +136,6 @@ def _within(element: Any) -> str:
     return "".join(f" in {part}" for part in parts[: named[0] + 1 if named else 1])
 
 
-def _up_to(element: Any, root: Any) -> Iterator[Any]:
-    while element is not root:
-        yield element
-        element = element.getparent()
-
-
 def _named(element: Any) -> str:
     name = element.get("name")
     named = "" if name is None or element.tag == "robot" else f' name="{shortened(name, 60)}"'
