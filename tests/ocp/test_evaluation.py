@@ -33,7 +33,10 @@ def without_library(robot, scenario, formulation=None) -> mt.Problem:
     with pytest.MonkeyPatch.context() as patch:
         for module in (evaluation, tapes):
             patch.setattr(module, "library", lambda: None)
-        return mt.build(robot, scenario, formulation)
+        problem = mt.build(robot, scenario, formulation)
+        for name in FUNCTIONS:  # a function is made when it is asked for first
+            getattr(problem.nlp, name)
+        return problem
 
 
 @pytest.fixture(scope="module")

@@ -244,7 +244,7 @@ def solve(
     console.print(
         f"{scenario.title}: {the_robot.name}, {scenario.knots} knots, {problem.lower.size} variables, "
         f"{problem.row_lower.size} rows, built in {time.perf_counter() - started:.1f} s"
-        f"{'' if problem.nlp.taped or missing() else ' with some functions by CasADi'}, "
+        f"{'' if problem.taped or missing() else ' with some functions by CasADi'}, "
         f"linear solver {chosen_solver.name}",
         soft_wrap=True,
     )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import copyreg
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from typing import Any
 
 import casadi as cs
 import numpy as np
+from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
@@ -17,9 +19,9 @@ from multimodal_to.models.state import State
 from multimodal_to.ocp import given, rebinding
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.outline import formulate, prepared
-from multimodal_to.ocp.problem import Problem, RowSet
+from multimodal_to.ocp.problem import EagerRows, Problem, RowSet
 from multimodal_to.ocp.stages import NamedStage
-from multimodal_to.ocp.transcription import Stage, assemble, symbolic
+from multimodal_to.ocp.transcription import Nlp, Stage, symbolic
 from multimodal_to.scenarios.scenario import Scenario
 
 
@@ -51,8 +53,7 @@ def build(
     outline = formulate(robot, scenario, standing, formulation, initial)
     outline.refuse_crossed()
     layout = outline.layout
-    stages = [named.stage for named in outline.stages]
-    nlp = assemble(stages, layout.size, scenario.knots)
+    stages = tuple(named.stage for named in outline.stages)
 
     scale = np.append(np.tile(layout.scale, scenario.knots + 1), formulation.interval_scale)
     lower, upper = rebinding.stacked(outline.bounds, layout, scenario, scale)
@@ -67,7 +68,8 @@ def build(
         formulation=formulation,
         layout=layout,
         opti=_opti(stages, layout.size, scenario.knots, (lower, upper), (row_lower, row_upper)),
-        nlp=nlp,
+        nlp=Nlp(stages=stages, size=layout.size, knots=scenario.knots),
+        eager=_eager(outline.stages, formulation.lazy_terms, layout.size, scenario.knots),
         lower=lower,
         upper=upper,
         box_lower=box_lower,
@@ -123,17 +125,45 @@ def _row_bounds(stages: Sequence[NamedStage]) -> tuple[Array, Array, dict[str, R
     return np.concatenate(low), np.concatenate(high), sets
 
 
+def _eager(stages: Sequence[NamedStage], lazy: Collection[str], size: int, knots: int) -> EagerRows | None:
+    """Return the rows that are not lazy, and a problem's functions with them alone; None where all rows are these.
+
+    Args:
+        stages: of the problem.
+        lazy: names of the terms whose rows are lazy.
+        size: number of variables of a knot.
+        knots: N, the number of intervals.
+    """
+    kept, index, first = list[Stage](), list[NDArray[np.int64]](), 0
+    for named in stages:
+        stage, sizes = named.stage, [rows.expression.shape[0] for _, rows in named.rows]
+        height = sum(sizes)
+        eager = [name not in lazy for name, _ in named.rows]
+        offsets = np.flatnonzero(np.repeat(eager, sizes))[:, None]
+        index.append((first + offsets + height * np.arange(stage.repeats)).ravel(order="F"))
+        first += height * stage.repeats
+        if not all(eager):
+            families = zip(stage.lifted_families, eager, strict=True)
+            stage = replace(stage, lifted_families=tuple(rows for rows, here in families if here))
+        if any(eager) or named.cost_names:
+            kept.append(stage)
+    rows = np.concatenate(index)
+    return None if rows.size == first else EagerRows(Nlp(stages=tuple(kept), size=size, knots=knots), rows)
+
+
 def _refuse_no_numbers(problem: Problem, stages: Sequence[NamedStage]) -> None:
-    """Make sure that every term and its derivatives are numbers at the start guess.
+    """Make sure that every term and its derivatives are numbers at the start guess; of lazy rows only the values.
 
     Raises:
         FormulationError: one is not.
     """
     guess, empty = problem.guess, np.zeros(0)
-    values, jacobian = problem.nlp.jacobian(guess, empty)
-    slopes = np.zeros(problem.row_lower.size)
-    np.add.at(slopes, np.array(jacobian.sparsity().get_triplet()[0], dtype=np.int64), np.array(jacobian.nonzeros()))
-    for what, numbers in (("value", np.array(values).ravel()), ("derivative", slopes)):
+    nlp = problem.eager.nlp if problem.eager else problem.nlp
+    index = problem.eager.index if problem.eager else np.arange(problem.row_lower.size)
+    jacobian, slopes = nlp.jacobian(guess, empty)[1], np.zeros(problem.row_lower.size)
+    of_row = index[np.array(jacobian.sparsity().get_triplet()[0], dtype=np.int64)]
+    np.add.at(slopes, of_row, np.array(jacobian.nonzeros()))
+    for what, numbers in (("value", problem.rows_at(guess)), ("derivative", slopes)):
         for name, rows in problem.rows.items():
             if (bad := np.flatnonzero(~np.isfinite(numbers[rows.index]))).size:
                 where = f"knot {rows.knots[bad[0]]}" + " ".join(("", str(rows.components[bad[0]]))).rstrip()
@@ -147,7 +177,7 @@ def _refuse_no_numbers(problem: Problem, stages: Sequence[NamedStage]) -> None:
                 f"the term '{name}': its value at the start guess is no finite number; expected a function that is "
                 "smooth there"
             )
-    if not np.isfinite(np.array(problem.nlp.gradient(guess, empty)[1])).all():
+    if not np.isfinite(np.array(nlp.gradient(guess, empty)[1])).all():
         names = [name for named in stages for name in _steep_costs(problem, named)]
         raise FormulationError(
             f"the term '{listed(names)}': its derivative at the start guess is no finite number; expected a function "

@@ -72,6 +72,11 @@ class Formulation:
         return tuple(term for term in self.terms if isinstance(term, Constraint))
 
     @property
+    def lazy_terms(self) -> frozenset[str]:
+        """Return the names of the constraints whose rows are lazy."""
+        return frozenset(term.name for term in self.constraints if term.lazy)
+
+    @property
     def costs(self) -> tuple[Cost, ...]:
         """Return the costs, in order."""
         return tuple(term for term in self.terms if isinstance(term, Cost))

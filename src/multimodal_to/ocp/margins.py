@@ -189,6 +189,7 @@ JOINT_TORQUES = Constraint(
     labels=_limited_joint_names,
     when=_asked("torque"),
     present=_unpushed,
+    lazy=True,  # a torque couples the velocities of two intervals, so that fronts are half as large again
 )
 JOINT_TORQUES_PUSHED = replace(
     JOINT_TORQUES,

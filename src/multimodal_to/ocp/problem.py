@@ -55,6 +55,14 @@ class BoundSet(RowSet):
         return missed(x[self.index], self.lower, self.upper)
 
 
+@dataclass(frozen=True, eq=False)
+class EagerRows(Value):
+    """The rows of a problem that are not lazy."""
+
+    nlp: Nlp  # with these rows alone
+    index: NDArray[np.int64]  # into g
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem(Value):
     """A scenario for a robot as an `Opti` problem, with the names of its variables, rows and costs.
@@ -69,6 +77,7 @@ class Problem(Value):
     layout: Layout
     opti: cs.Opti
     nlp: Nlp
+    eager: EagerRows | None = None  # None: no row is lazy
     lower: Array  # of x
     upper: Array
     box_lower: Array  # of x, without the terms that are bounds
@@ -91,6 +100,25 @@ class Problem(Value):
 
     def _asked(self) -> tuple[Robot, Scenario, Formulation]:
         return self.robot, self.scenario, self.formulation
+
+    @property
+    def taped(self) -> bool:
+        """Return whether all functions that were asked for so far are evaluated by tapes."""
+        return self.nlp.taped and (self.eager is None or self.eager.nlp.taped)
+
+    @checked
+    def misses_lazy_rows(self, x: Array, within: float) -> bool:
+        """Return whether a lazy row is missed at x.
+
+        Args:
+            x: all variables, in solver units.
+            within: by more than this, in solver units; less than zero asks for a distance from the limits.
+        """
+        if self.eager is None:
+            return False
+        beyond = np.maximum(self.row_lower - (g := self.rows_at(x)), g - self.row_upper)
+        beyond[self.eager.index] = -np.inf
+        return bool((beyond > within).any())
 
     @checked
     def start_from(self, trajectory: Trajectory) -> Array:

@@ -264,6 +264,8 @@ class Constraint:
         when: for which problems the constraint exists; by default for all.
         rigid: `relax` does not let the rows give way unless it is told to.
         present: which of its rows exist at which of the knots where it holds; by default all.
+        lazy: `Ipopt` leaves the rows out until an answer without them misses one: for rows that seldom hold with
+            equality, and that make every step cost much more.
 
     Raises:
         FormulationError: something of this is not what it should be.
@@ -279,6 +281,7 @@ class Constraint:
     when: Callable[[Parameters], bool] | None = None
     rigid: bool = False
     present: Present | None = None
+    lazy: bool = False
 
     def __post_init__(self) -> None:
         _complete(self, self.value, "holds")

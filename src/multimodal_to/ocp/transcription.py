@@ -67,6 +67,12 @@ class Stage:
             [local + size * self.starts, local + size * (self.starts + 1), np.full((1, self.repeats), last)]
         )
 
+    def row_places(self, first: int) -> Integers:
+        """Return where the stage's rows stand among all rows, (m, repeats); `first` is the place of the first one."""
+        height = self.rows.shape[0]
+        places: Integers = first + np.arange(height)[:, None] + height * np.arange(self.repeats)
+        return places
+
     def block(self, function: cs.Function, size: int, last: int, first_row: int = 0) -> Block:
         """Return one of its functions at all its intervals.
 
@@ -133,94 +139,137 @@ class Stage:
 class Nlp:
     """Functions of all variables x = (vec Z, Δt) for CasADi's `nlpsol`, in its names and signatures.
 
-    They are evaluated by tapes of the native library, where there is one. CasADi cannot derive them: `symbolic` can be.
-    Whoever hands them to CasADi has to keep them.
+    Rows are ordered by stage, then interval, then row. Each function is made when it is asked for first. They are
+    evaluated by tapes of the native library, where there is one. CasADi cannot derive them: `symbolic` can be. Whoever
+    hands them to CasADi has to keep them.
     """
 
-    rows: Evaluation  # x → g
-    costs: Evaluation  # x → costs by stage and name, stacked
-    objective: Evaluation  # x → f
-    gradient: Evaluation  # grad_f: (x, p) → f, ∇f, with an empty p
-    jacobian: Evaluation  # jac_g: (x, p) → g, ∂g/∂x
-    hessian: Evaluation  # hess_lag: (x, p, λ_f, λ_g) → upper Hessian of the Lagrangian
-    cost_hessian: Evaluation  # the same without the curvature of the rows
+    stages: tuple[Stage, ...]  # in the order of their rows
+    size: int  # of a knot's variables
+    knots: int  # N, the number of intervals
+
+    @cached_property
+    def rows(self) -> Evaluation:
+        """Return x → g."""
+        return Evaluation("rows", self._of_x, [self._every_row])
+
+    @cached_property
+    def costs(self) -> Evaluation:
+        """Return x → costs by stage and name, stacked."""
+        return Evaluation("costs", self._of_x, [self._every_cost])
+
+    @cached_property
+    def objective(self) -> Evaluation:
+        """Return x → f."""
+        return Evaluation("objective", self._of_x, [self._objective])
+
+    @cached_property
+    def gradient(self) -> Evaluation:
+        """Return grad_f: (x, p) → f, ∇f, with an empty p."""
+        entries = []
+        for stage, places, _ in self._placed:
+            function, pattern = stage.gradient()
+            entries.append(Entries(block=self._block(stage, function), rows=places[pattern.row()], columns=_NONE))
+        slope = Output(name="grad_f_x", shape=(self._count, 1), entries=_some(entries), dense=True)
+        return Evaluation("nlp_grad_f", self._of_x | {"p": 0}, [self._objective, slope])
+
+    @cached_property
+    def jacobian(self) -> Evaluation:
+        """Return jac_g: (x, p) → g, ∂g/∂x."""
+        entries = []
+        for stage, places, first_row in self._placed:
+            function, pattern = stage.jacobian()
+            row, column = pattern.get_triplet()
+            block = self._block(stage, function)
+            entries.append(Entries(block=block, rows=stage.row_places(first_row)[row], columns=places[column]))
+        shape = (self._heights[-1], self._count)
+        matrix = Output(name="jac_g_x", shape=shape, entries=_some(entries))
+        return Evaluation("nlp_jac_g", self._of_x | {"p": 0}, [self._every_row, matrix])
+
+    @cached_property
+    def hessian(self) -> Evaluation:
+        """Return hess_lag: (x, p, λ_f, λ_g) → upper Hessian of the Lagrangian."""
+        return self._curvature([stage.hessian() for stage in self.stages])
+
+    @cached_property
+    def cost_hessian(self) -> Evaluation:
+        """Return the same without the curvature of the rows."""
+        return self._curvature([stage.cost_hessian() for stage in self.stages])
 
     @property
     def taped(self) -> bool:
-        """Return whether all of them are evaluated by tapes."""
-        every = (self.rows, self.costs, self.objective, self.gradient, self.jacobian, self.hessian, self.cost_hessian)
-        return all(each.taped for each in every)
+        """Return whether all of them that were asked for so far are evaluated by tapes."""
+        return all(some.taped for some in vars(self).values() if isinstance(some, Evaluation))
+
+    @property
+    def _count(self) -> int:
+        return self.size * (self.knots + 1) + 1
+
+    @property
+    def _of_x(self) -> dict[str, int]:
+        return {"x": self._count}
+
+    @cached_property
+    def _heights(self) -> list[int]:
+        """Return where the rows of each stage begin, and how many there are in all."""
+        return [0, *np.cumsum([stage.rows.shape[0] * stage.repeats for stage in self.stages]).tolist()]
+
+    @cached_property
+    def _placed(self) -> list[tuple[Stage, Integers, int]]:
+        """Return each stage, where its arguments stand among all variables, and where its rows begin."""
+        return [
+            (stage, stage.positions(self.size, self._count - 1), first_row)
+            for stage, first_row in zip(self.stages, self._heights, strict=False)
+        ]
+
+    @cached_property
+    def _every_row(self) -> Output:
+        entries = [
+            Entries(block=self._block(stage, stage.row_function()), rows=stage.row_places(first_row), columns=_NONE)
+            for stage, _, first_row in self._placed
+        ]
+        return Output(name="g", shape=(self._heights[-1], 1), entries=_some(entries), dense=True)
+
+    @cached_property
+    def _every_cost(self) -> Output:
+        entries, first = list[Entries](), 0
+        for stage in self.stages:
+            places = first + np.arange(stage.costs.shape[0])[:, None]
+            entries.append(Entries(block=self._block(stage, stage.cost_function()), rows=places, columns=_NONE))
+            first += stage.costs.shape[0]
+        return Output(name="costs", shape=(first, 1), entries=_some(entries), dense=True, in_order=True)
+
+    @property
+    def _objective(self) -> Output:
+        return replace(self._every_cost, name="f", total=True)
+
+    def _curvature(self, functions: Sequence[tuple[cs.Function, cs.Sparsity]]) -> Evaluation:
+        entries = []
+        for (stage, places, first_row), (function, pattern) in zip(self._placed, functions, strict=True):
+            row, column = pattern.get_triplet()
+            block = self._block(stage, function, first_row)
+            entries.append(Entries(block=block, rows=places[row], columns=places[column]))
+        matrix = Output(name="triu_hess_gamma_x_x", shape=(self._count, self._count), entries=_some(entries))
+        inputs = self._of_x | {"p": 0, "lam_f": 1, "lam_g": self._heights[-1]}
+        return Evaluation("nlp_hess_l", inputs, [matrix])
+
+    def _block(self, stage: Stage, function: cs.Function, first_row: int = 0) -> Block:
+        return stage.block(function, self.size, self._count - 1, first_row)
 
 
-def assemble(stages: Sequence[Stage], size: int, knots: int) -> Nlp:
-    """Return the NLP of `knots` + 1 knots of `size` variables each, and one Δt.
+_NONE = np.zeros((1, 1), dtype=np.int64)
 
-    Rows are ordered by stage, then interval, then row.
 
-    Args:
-        stages: in the order of their rows.
-        size: number of variables of a knot.
-        knots: N, the number of intervals.
-    """
-    count = size * (knots + 1) + 1
-    none = np.zeros((1, 1), dtype=np.int64)
-    rows, costs, gradients, jacobians, hessians, cost_hessians = (list[Entries]() for _ in range(6))
-    first_row = first_cost = 0
-    for stage in stages:
-        places = stage.positions(size, count - 1)
-        height = stage.rows.shape[0]
-        row_places = first_row + np.arange(height)[:, None] + height * np.arange(stage.repeats)
-        cost_places = first_cost + np.arange(stage.costs.shape[0])[:, None]
-        rows.append(Entries(block=stage.block(stage.row_function(), size, count - 1), rows=row_places, columns=none))
-        costs.append(Entries(block=stage.block(stage.cost_function(), size, count - 1), rows=cost_places, columns=none))
-        function, pattern = stage.gradient()
-        block = stage.block(function, size, count - 1)
-        gradients.append(Entries(block=block, rows=places[pattern.row()], columns=none))
-        function, pattern = stage.jacobian()
-        row, column = pattern.get_triplet()
-        block = stage.block(function, size, count - 1)
-        jacobians.append(Entries(block=block, rows=row_places[row], columns=places[column]))
-        function, pattern = stage.hessian()
-        row, column = pattern.get_triplet()
-        block = stage.block(function, size, count - 1, first_row)
-        hessians.append(Entries(block=block, rows=places[row], columns=places[column]))
-        function, pattern = stage.cost_hessian()
-        row, column = pattern.get_triplet()
-        block = stage.block(function, size, count - 1, first_row)
-        cost_hessians.append(Entries(block=block, rows=places[row], columns=places[column]))
-        first_row += height * stage.repeats
-        first_cost += stage.costs.shape[0]
-
-    rows, costs, gradients, jacobians, hessians, cost_hessians = (
-        [some for some in each if some.block.outputs]
-        for each in (rows, costs, gradients, jacobians, hessians, cost_hessians)
-    )
-    of_x, of_x_and_p = {"x": count}, {"x": count, "p": 0}
-    of_all = {"x": count, "p": 0, "lam_f": 1, "lam_g": first_row}
-    every_row = Output(name="g", shape=(first_row, 1), entries=rows, dense=True)
-    every_cost = Output(name="costs", shape=(first_cost, 1), entries=costs, dense=True, in_order=True)
-    objective = replace(every_cost, name="f", total=True)
-    gradient = Output(name="grad_f_x", shape=(count, 1), entries=gradients, dense=True)
-    jacobian = Output(name="jac_g_x", shape=(first_row, count), entries=jacobians)
-    hessian, cost_hessian = (
-        Output(name="triu_hess_gamma_x_x", shape=(count, count), entries=each) for each in (hessians, cost_hessians)
-    )
-    return Nlp(
-        rows=Evaluation("rows", of_x, [every_row]),
-        costs=Evaluation("costs", of_x, [every_cost]),
-        objective=Evaluation("objective", of_x, [objective]),
-        gradient=Evaluation("nlp_grad_f", of_x_and_p, [objective, gradient]),
-        jacobian=Evaluation("nlp_jac_g", of_x_and_p, [every_row, jacobian]),
-        hessian=Evaluation("nlp_hess_l", of_all, [hessian]),
-        cost_hessian=Evaluation("nlp_hess_l", of_all, [cost_hessian]),
-    )
+def _some(entries: Sequence[Entries]) -> list[Entries]:
+    """Return the entries of blocks that have values."""
+    return [each for each in entries if each.block.outputs]
 
 
 def symbolic(stages: Sequence[Stage], x: cs.MX, size: int, knots: int) -> tuple[cs.MX, cs.MX]:
     """Return rows and objective at x as expressions that CasADi evaluates and derives itself.
 
     Args:
-        stages: as for `assemble`.
+        stages: in the order of their rows.
         x: all variables.
         size: number of variables of a knot.
         knots: N, the number of intervals.

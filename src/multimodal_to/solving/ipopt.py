@@ -16,7 +16,9 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import check_fields
 from multimodal_to.errors import InputError, SolverError
+from multimodal_to.native.stage_solver import KktStructure
 from multimodal_to.ocp.problem import Problem
+from multimodal_to.ocp.transcription import Nlp
 from multimodal_to.solving import linear_solvers, machine, stages
 from multimodal_to.solving.solver import Ending, StartPoint, Watch
 from multimodal_to.solving.status import Status
@@ -41,6 +43,10 @@ _WARM_PUSH = 1e-6
 """The same for an answer to start from, which touches its bounds."""
 
 
+_NEAR = 0.01
+"""How near to its limit a lazy row of an answer is that may be missed by the next one, in solver units."""
+
+
 _BARRIER_TOLERANCE = 50.0
 """How loosely a barrier problem is solved before the next: in multiples of its parameter; IPOPT's own is 10."""
 
@@ -63,6 +69,9 @@ class Ipopt:
     The rough pass leaves the curvature of the rows out of the Hessian. What is left is convex, so that a step takes
     one factorisation and is long, and a start guess that meets hardly any row becomes a motion that nearly meets them.
     The exact pass goes on from there.
+
+    Lazy rows are left out at first. Where the answer misses one, a further exact pass goes on from it with all rows. An
+    answer of before that is at the limit of a lazy row is gone on from with all rows at once.
 
     Raises:
         InputError: an option is out of its range, or there is no linear solver of that name.
@@ -156,13 +165,15 @@ class Ipopt:
         started, iterations, x, solver = time.perf_counter(), 0, start.x, self
         facts: dict[str, Any] = {}
         passes = list(_passes(start))
+        whole = start.record is not None and problem.misses_lazy_rows(x, -_NEAR)
+        posed = _Posed.of(problem, whole=whole or problem.eager is None)
         while passes:
             which = passes[0]
             seconds = max(self.time_limit - (time.perf_counter() - started), 1e-3)
             options = solver.options(max(self.max_iterations - iterations, 1), seconds, which)
-            with stages.offered(options, stages.structure_of(problem), start.kept) as structured:
+            with stages.offered(options, posed.structure, start.kept) as structured:
                 with nullcontext() if structured else machine.memory_kept():
-                    end, statistics = _run(problem, x, options, _Watcher(problem, watch, iterations, which))
+                    end, statistics = _run(posed, x, options, _Watcher(posed, watch, iterations, which))
                 failure = stages.failure(structured, str(statistics["return_status"]))
             if failure:  # the same pass once more; how far this one got is not always known
                 solver = replace(self, linear_solver=linear_solvers.MUMPS)
@@ -175,6 +186,10 @@ class Ipopt:
             status = self.status(message)
             if status in (Status.TIME_LIMIT, Status.STOPPED) or iterations >= self.max_iterations:
                 break
+            missed = status.solved and problem.misses_lazy_rows(x, self.violation_tolerance)
+            if not passes and not posed.whole and missed:
+                posed = _Posed.of(problem, whole=True)
+                passes.append(Pass.EXACT)
         return Ending(
             x=x,
             status=status,
@@ -196,10 +211,31 @@ def _passes(start: StartPoint) -> tuple[Pass, ...]:
     return (Pass.ROUGH, Pass.EXACT) if start.label == Pass.ROUGH.value else (Pass.EXACT,)
 
 
+@dataclass(frozen=True, eq=False)
+class _Posed:
+    """What IPOPT is given of a problem: with all rows, or without the lazy ones."""
+
+    nlp: Nlp
+    lower: Array  # of x
+    upper: Array
+    row_lower: Array  # of its rows
+    row_upper: Array
+    structure: KktStructure
+    whole: bool
+
+    @classmethod
+    def of(cls, problem: Problem, *, whole: bool) -> _Posed:
+        """Return it for a problem; `whole` asks for all rows."""
+        eager = None if whole else problem.eager
+        nlp, rows = (problem.nlp, slice(None)) if eager is None else (eager.nlp, eager.index)
+        bounds = problem.lower, problem.upper, problem.row_lower[rows], problem.row_upper[rows]
+        return cls(nlp, *bounds, structure=stages.structure(stages.variable_knots(problem), *bounds), whole=whole)
+
+
 @machine.one_blas_thread()
-def _run(problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher) -> tuple[Array, dict[str, Any]]:
+def _run(posed: _Posed, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher) -> tuple[Array, dict[str, Any]]:
     """Run IPOPT once from x; return where it ended, answer or not, and its statistics."""
-    nlp, symbol = problem.nlp, cs.MX.sym("x", problem.lower.size)
+    nlp, symbol = posed.nlp, cs.MX.sym("x", posed.lower.size)
     options: dict[str, Any] = {
         "print_time": False,
         "no_nlp_grad": True,  # for the multipliers of parameters, of which there are none
@@ -216,7 +252,7 @@ def _run(problem: Problem, x: Array, ipopt_options: dict[str, Any], watcher: _Wa
     functions = {"x": symbol, "f": nlp.objective(symbol), "g": nlp.rows(symbol)}
     try:
         solver = cs.nlpsol("solver", "ipopt", functions, options)  # goes with its memory when this solve ends
-        ended = solver(x0=x, lbx=problem.lower, ubx=problem.upper, lbg=problem.row_lower, ubg=problem.row_upper)
+        ended = solver(x0=x, lbx=posed.lower, ubx=posed.upper, lbg=posed.row_lower, ubg=posed.row_upper)
     except RuntimeError as error:
         raise watcher.error or SolverError(f"the solver did not run: {error}") from error
     if watcher.error is not None:
@@ -234,9 +270,9 @@ _SHOWN = tuple(cs.nlpsol_out(index) for index in range(cs.nlpsol_n_out()))
 class _Watcher(cs.Callback):  # type: ignore[misc]
     """CasADi's iteration callback: shows every iterate to `watch`, and stops the pass when asked."""
 
-    def __init__(self, problem: Problem, watch: Watch, iteration: int, which: Pass) -> None:
+    def __init__(self, posed: _Posed, watch: Watch, iteration: int, which: Pass) -> None:
         cs.Callback.__init__(self)
-        self._problem, self._watch, self._iteration = problem, watch, iteration
+        self._posed, self._watch, self._iteration = posed, watch, iteration
         self.which, self.stopped = which, False
         self.error: Exception | None = None
         self.construct("watcher")
@@ -251,8 +287,8 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
         return str(cs.nlpsol_out(index))
 
     def get_sparsity_in(self, index: int) -> cs.Sparsity:
-        variables = self._problem.lower.size
-        rows = self._problem.row_lower.size
+        variables = self._posed.lower.size
+        rows = self._posed.row_lower.size
         sizes = {"f": 1, "x": variables, "lam_x": variables, "g": rows, "lam_g": rows, "lam_p": 0}
         return cs.Sparsity.dense(sizes.get(cs.nlpsol_out(index), 0), 1)
 
@@ -275,7 +311,7 @@ class _Watcher(cs.Callback):  # type: ignore[misc]
         return self._watch(
             x,
             iteration=self._iteration - 1,
-            rows=rows,
+            rows=rows if self._posed.whole else None,
             objective=float(objective[0]),
             label=self.which.value,
         )

@@ -174,7 +174,7 @@ def _environment(problem: Problem, solver: Solver) -> dict[str, Any]:
         **solver.facts,
         "formulation": problem.formulation.described(),
         "native": instruction_set(),
-        "taped": problem.nlp.taped,
+        "taped": problem.taped,
         "threads": threads,
         "versions": machine.versions(),
     }

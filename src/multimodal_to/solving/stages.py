@@ -25,11 +25,6 @@ def variable_knots(problem: Problem) -> NDArray[np.int32]:
     return np.append(knots, OF_NO_KNOT).astype(np.int32)
 
 
-def structure_of(problem: Problem) -> KktStructure:
-    """Return the structure of the KKT matrix of a problem."""
-    return structure(variable_knots(problem), problem.lower, problem.upper, problem.row_lower, problem.row_upper)
-
-
 def structure(knots: NDArray[np.int32], lower: Array, upper: Array, row_lower: Array, row_upper: Array) -> KktStructure:
     """Return the structure of IPOPT's KKT matrix.
 
