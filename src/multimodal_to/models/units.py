@@ -75,6 +75,9 @@ class Units:
 _POWERS = {"": 1, "²": 2, "³": 3, "⁴": 4}
 _SYMBOL = re.compile("([A-Za-z1%]+)([²³⁴]?)")
 
+_AS_WRITTEN = 1e-3
+"""How far a robot may be from the `REFERENCE` for numbers to be as they are written [1]: last digits change none."""
+
 REFERENCE = Units(mass=44.74, length=0.5765, gravity=9.807)
 """The size of robot that a `Sized` number is written for: the iRonCub's."""
 
@@ -95,10 +98,33 @@ class Sized:
         REFERENCE.of(self.unit)
 
     def of(self, units: Units) -> float:
-        """Return the number for a robot [unit], of two digits, so that a person can read it."""
-        return float(f"{self.value * (units.of(self.unit) / REFERENCE.of(self.unit)):.1e}")
+        """Return the number for a robot [unit]; one of the reference size, to a thousandth, has it as it is written."""
+        ratio = units.of(self.unit) / REFERENCE.of(self.unit)
+        return self.value * ratio if abs(ratio - 1.0) > _AS_WRITTEN else float(self.value)
+
+
+@dataclass(frozen=True)
+class OwnSize:
+    """A size that grows and shrinks with the robot, in whatever unit the thing has that it is the size of."""
+
+    value: float  # for a robot of the reference size [unit of the thing]
+
+    def of(self, unit: str, units: Units) -> float:
+        """Return the size for a robot, of a thing in a unit [that unit]."""
+        return Sized(self.value, unit).of(units)
 
 
 def sized(number: float | Sized, units: Units) -> float:
     """Return a number as it is, and one that is `Sized` for a robot."""
     return number.of(units) if isinstance(number, Sized) else float(number)
+
+
+def size_of(scale: float | OwnSize, unit: str, units: Units) -> float:
+    """Return a size as it is, and an `OwnSize` for a robot.
+
+    Args:
+        scale: the size.
+        unit: of the thing that it is the size of.
+        units: the robot's own.
+    """
+    return scale.of(unit, units) if isinstance(scale, OwnSize) else float(scale)

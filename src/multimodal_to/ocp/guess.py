@@ -15,6 +15,7 @@ from multimodal_to.errors import ScenarioError
 from multimodal_to.models.attitude import signed_like
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Surface, heights_below
+from multimodal_to.models.units import Sized
 from multimodal_to.ocp import waypoints
 from multimodal_to.ocp.flights import flights, interval, thrown
 from multimodal_to.ocp.gait import footfalls, steps
@@ -23,8 +24,8 @@ from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 
-_CONTACT_TOLERANCE = 1e-6
-"""A sole counts as on the ground below this height [m]: more corners than a plane needs make it overdetermined."""
+_CONTACT_TOLERANCE = Sized(1e-6, "m")
+"""A sole counts as on the ground below this height: more corners than a plane needs make it overdetermined."""
 PLACES_WEIGHT = 30.0
 """How much feet that are elsewhere than at home count, in squares of L, beside squares of joints' ways [rad²]."""
 _TILT_MAX = 0.6
@@ -32,8 +33,8 @@ _TILT_MAX = 0.6
 
 _ALONG_GROUND = np.array([[1.0], [1.0], [0.0]])
 """What takes the vertical part from positions side by side [1], (3, 1)."""
-IN_THE_AIR = 1e-3
-"""A contact point that is higher than this bears no force [m]."""
+IN_THE_AIR = Sized(1e-3, "m")
+"""A contact point that is higher than this bears no force."""
 LANDED = 0.3
 """Share of the horizon in which a motion from the air to the ground comes down [1]."""
 
@@ -99,7 +100,7 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
             lbx=np.concatenate([np.full(3, -np.inf), np.full(3, -tilt_max), limits.lower]),
             ubx=np.concatenate([np.full(3, np.inf), np.full(3, tilt_max), limits.upper]),
             lbg=np.concatenate([com, np.zeros(len(heights))]),
-            ubg=np.concatenate([com, np.full(len(heights), _CONTACT_TOLERANCE)]),
+            ubg=np.concatenate([com, np.full(len(heights), _CONTACT_TOLERANCE.of(robot.units))]),
         )
         return np.array(result["x"]).ravel() if solver.stats()["success"] else None
 
@@ -185,7 +186,7 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
         view[name][2] += speed
     if scenario.keyframes:
         points = waypoints.pose(robot, scenario, view, points)
-        shares = shares * (points[:, 2] - _ground(scenario, points) < IN_THE_AIR)
+        shares = shares * (points[:, 2] - _ground(scenario, points) < IN_THE_AIR.of(robot.units))
     view["contact_positions"][:] = points.reshape(-1, knots)
     view["contact_forces"][2::3] = robot.weight * (1.0 - flown) * shares
     return guess
