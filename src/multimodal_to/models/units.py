@@ -114,6 +114,10 @@ class OwnSize:
         return Sized(self.value, unit).of(units)
 
 
+ONE = OwnSize(1.0)
+"""What for a robot of the reference size is one SI unit."""
+
+
 def sized(number: float | Sized, units: Units) -> float:
     """Return a number as it is, and one that is `Sized` for a robot."""
     return number.of(units) if isinstance(number, Sized) else float(number)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.contact import FACES
-from multimodal_to.models.units import OwnSize
+from multimodal_to.models.units import ONE, OwnSize
 from multimodal_to.ocp import constraints, contacts, costs, failures, pushes, regions
 from multimodal_to.ocp.contacts import ON_GROUND
 from multimodal_to.ocp.parameters import Parameters
@@ -408,7 +408,7 @@ def running(
     residual: KnotFunction | IntervalFunction,
     unit: Units,
     *charged: Where,
-    scale: float | OwnSize = OwnSize(1.0),
+    scale: float | OwnSize = ONE,
 ) -> Cost:
     """Return a cost that is charged per second, with the scenario's weight of the residual's name.
 

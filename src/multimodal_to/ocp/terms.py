@@ -21,7 +21,7 @@ from multimodal_to.adam.spatial import SX, Array
 from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import FormulationError, MultimodalError, listed, said, shown
 from multimodal_to.models.joint_units import either, joint_units
-from multimodal_to.models.units import OwnSize, Sized, size_of, sized
+from multimodal_to.models.units import ONE, OwnSize, Sized, size_of, sized
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
@@ -280,7 +280,7 @@ class Constraint:
     unit: Units
     name: str = ""
     holds: Place | tuple[Place, ...] = Where.EVERY_KNOT
-    scale: float | OwnSize = OwnSize(1.0)
+    scale: float | OwnSize = ONE
     labels: Labels = ()
     when: Callable[[Parameters], bool] | None = None
     rigid: bool = False
@@ -373,7 +373,7 @@ class Cost:
     name: str = ""
     charged: Place | tuple[Place, ...] = Where.LATER_KNOTS
     per_second: bool = True
-    scale: float | OwnSize = OwnSize(1.0)
+    scale: float | OwnSize = ONE
     when: Callable[[Parameters], bool] | None = None
 
     def __post_init__(self) -> None:

@@ -14,7 +14,7 @@ from multimodal_to.arguments import check_fields
 from multimodal_to.errors import FormulationError, ScenarioError, unknown
 from multimodal_to.models.joint_units import either
 from multimodal_to.models.robot import Robot
-from multimodal_to.models.units import OwnSize, size_of
+from multimodal_to.models.units import ONE, OwnSize, size_of
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import QUANTITIES, row_units
 from multimodal_to.values import Value
@@ -31,7 +31,7 @@ class Variable:
     """
 
     name: str  # one of `QUANTITIES`, which has its rows and its unit
-    scale: float | OwnSize = OwnSize(1.0)  # [unit of the quantity]
+    scale: float | OwnSize = ONE  # [unit of the quantity]
 
     def __post_init__(self) -> None:
         check_fields(self, FormulationError)
