@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from multimodal_to.arguments import check_fields
 from multimodal_to.errors import InputError, shown
@@ -31,12 +31,21 @@ class Units:
     """L, height of the CoM above the contact points at home [m]."""
     gravity: float
     """g, or `EARTH` for a robot that is weightless [m/s²]."""
+    contact_points: int = 8
+    """n, how many contact points share the weight, each of them m g / n [1]."""
 
     def __post_init__(self) -> None:
         check_fields(self)
+        if self.contact_points < 1:
+            raise InputError(f"contact_points is {self.contact_points}; expected at least one")
         for name, value in (("mass", self.mass), ("length", self.length), ("gravity", self.gravity)):
             if not 0 < value < math.inf:
                 raise InputError(f"{name} is {value}; expected a positive number")
+
+    @property
+    def of_a_point(self) -> Units:
+        """Return the units of one contact point: its share of the mass, so that m g is what it bears."""
+        return replace(self, mass=self.mass / self.contact_points, contact_points=1)
 
     def of(self, unit: str) -> float:
         """Return the robot's own unit for an SI unit, in that unit: `of("N")` is m g, `of("s")` is √(L/g).
@@ -92,6 +101,7 @@ class Sized:
 
     value: float  # for a robot of the reference size [unit]
     unit: str
+    of_a_point: bool = False  # it goes by what one contact point bears, and not by the whole robot
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -99,7 +109,8 @@ class Sized:
 
     def of(self, units: Units) -> float:
         """Return the number for a robot [unit]; one of the reference size, to a thousandth, has it as it is written."""
-        ratio = units.of(self.unit) / REFERENCE.of(self.unit)
+        own, written = (one.of_a_point if self.of_a_point else one for one in (units, REFERENCE))
+        ratio = own.of(self.unit) / written.of(self.unit)
         return self.value * ratio if abs(ratio - 1.0) > _AS_WRITTEN else float(self.value)
 
 
@@ -108,14 +119,17 @@ class OwnSize:
     """A size that grows and shrinks with the robot, in whatever unit the thing has that it is the size of."""
 
     value: float  # for a robot of the reference size [unit of the thing]
+    of_a_point: bool = False  # it goes by what one contact point bears, and not by the whole robot
 
     def of(self, unit: str, units: Units) -> float:
         """Return the size for a robot, of a thing in a unit [that unit]."""
-        return Sized(self.value, unit).of(units)
+        return Sized(self.value, unit, self.of_a_point).of(units)
 
 
 ONE = OwnSize(1.0)
 """What for a robot of the reference size is one SI unit."""
+ONE_OF_A_POINT = OwnSize(1.0, of_a_point=True)
+"""The same of what goes by the load of a contact point."""
 
 
 def sized(number: float | Sized, units: Units) -> float:

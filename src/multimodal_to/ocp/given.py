@@ -22,7 +22,7 @@ from multimodal_to.trajectory import Trajectory, rules
 from multimodal_to.trajectory.states import state_at
 from multimodal_to.values import FrozenMapping
 
-NO_FORCE = Sized(0.01, "N")
+NO_FORCE = Sized(0.01, "N", of_a_point=True)
 """Largest contact force component left at a knot that has to be free of contact."""
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.contact import FACES
-from multimodal_to.models.units import ONE, OwnSize
+from multimodal_to.models.units import ONE, ONE_OF_A_POINT, OwnSize
 from multimodal_to.ocp import constraints, contacts, costs, failures, pushes, regions
 from multimodal_to.ocp.contacts import ON_GROUND
 from multimodal_to.ocp.parameters import Parameters
@@ -171,7 +171,7 @@ FRICTION_CONE = Constraint(
     within=at_least(0.0),
     unit="N",
     holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
-    scale=constraints.FORCE,
+    scale=constraints.LOAD,
     labels=_faces,
     present=contacts.loaded_faces,
 )
@@ -180,6 +180,7 @@ COMPLEMENTARITY = Constraint(
     within=at_most(_complementarity_max),
     unit="N m",
     holds=Where.LATER_KNOTS,
+    scale=ONE_OF_A_POINT,
     labels=each("contact"),
     present=contacts.found_at_knot,
 )
@@ -273,6 +274,7 @@ SLIDING = Constraint(
     within=between(_sliding_min, _sliding_max),
     unit="N m",
     holds=Where.EVERY_INTERVAL,
+    scale=ONE_OF_A_POINT,
     labels=each("contact", "x", "y"),
     present=contacts.slides_before,
 )
@@ -293,6 +295,7 @@ COMPLEMENTARITY_BEFORE = Constraint(
     within=at_most(_complementarity_max),
     unit="N m",
     holds=Where.EVERY_INTERVAL,
+    scale=ONE_OF_A_POINT,
     labels=each("contact"),
     present=contacts.found_before,
 )
@@ -439,8 +442,8 @@ COSTS = (
     running(costs.joint_velocities, JointUnits("rad/s")),
     running(costs.posture, JointUnits("rad")),
     running(costs.base_orientation, "1"),
-    running(costs.contact_forces, "N", Where.FIRST_KNOT, Where.LATER_KNOTS, scale=constraints.FORCE),
-    running(costs.contact_force_rates, "N/s", Where.EVERY_INTERVAL, scale=constraints.FORCE),
+    running(costs.contact_forces, "N", Where.FIRST_KNOT, Where.LATER_KNOTS, scale=constraints.LOAD),
+    running(costs.contact_force_rates, "N/s", Where.EVERY_INTERVAL, scale=constraints.LOAD),
     running(costs.thrust, "N", scale=OwnSize(100.0)),
     running(costs.thrust_rate, "N/s", scale=constraints.FORCE),
     running(costs.throttle, "%", scale=50.0),

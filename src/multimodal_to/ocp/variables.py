@@ -57,7 +57,7 @@ VARIABLES = (
     Variable("joint_positions"),
     Variable("joint_velocities"),
     Variable("contact_positions"),
-    Variable("contact_forces", OwnSize(50.0)),
+    Variable("contact_forces", OwnSize(50.0, of_a_point=True)),
     Variable("thrust", OwnSize(100.0)),
     Variable("thrust_rate", OwnSize(50.0)),
     Variable("throttle", 50.0),
