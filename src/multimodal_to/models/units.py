@@ -47,6 +47,21 @@ class Units:
         """Return the units of one contact point: its share of the mass, so that m g is what it bears."""
         return replace(self, mass=self.mass / self.contact_points, contact_points=1)
 
+    @property
+    def frequency(self) -> float:
+        """Return √(g / L) [1/s]."""
+        return math.sqrt(self.gravity / self.length)
+
+    @property
+    def force(self) -> float:
+        """Return m g [N]."""
+        return self.mass * self.gravity
+
+    @property
+    def moment(self) -> float:
+        """Return m g L [N m]."""
+        return self.force * self.length
+
     def of(self, unit: str) -> float:
         """Return the robot's own unit for an SI unit, in that unit: `of("N")` is m g, `of("s")` is √(L/g).
 
@@ -58,7 +73,7 @@ class Units:
         Raises:
             InputError: it is no such unit.
         """
-        time, force = math.sqrt(self.length / self.gravity), self.mass * self.gravity
+        time, force = math.sqrt(self.length / self.gravity), self.force
         own = {
             "m": self.length,
             "s": time,
