@@ -30,6 +30,7 @@ from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import ENGINES, Jet
 from multimodal_to.models.proportions import Gait
 from multimodal_to.models.robot_keys import UNIONS, JetTable, JointTable, RobotFile
+from multimodal_to.models.units import EARTH, Units
 from multimodal_to.values import FrozenMapping, Value
 
 ROBOT_FILE = "robot.toml"
@@ -177,6 +178,12 @@ class Robot(Value):
         contacts = _offsets(self.kindyn, self.home, self.contact_names)
         jets = _offsets(self.kindyn, self.home, [jet.frame for jet in self.jets])
         return proportions.standing_height(contacts, jets)
+
+    @cached_property
+    def units(self) -> Units:
+        """Return the robot's own units: m, L and g."""
+        strength = float(np.linalg.norm(self.gravity))
+        return Units(mass=self.mass, length=self.standing_height, gravity=strength or EARTH)
 
     @cached_property
     def home_com(self) -> tuple[float, float, float]:
