@@ -1,0 +1,58 @@
+"""What the starter tasks share: what is given of contacts and bounds, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+from multimodal_to.errors import ScenarioError
+from multimodal_to.models.robot import Robot
+from multimodal_to.scenarios.contacts import ContactState, ContactStretch
+
+SPEED = 4.0
+"""Greatest speed of the base [√(g L)] and, where that is more, greatest rate [√(g/L)]."""
+
+
+def com_range(robot: Robot, way: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return how far the CoM may be from the origin [m]: the length of the way, and twice the standing height more."""
+    room = math.hypot(*way) + 2.0 * robot.standing_height
+    x, y, z = (abs(home) + room for home in robot.home_com)
+    return x, y, z
+
+
+def given(robot: Robot, state: ContactState, begin: float, end: float, clearance: float = 0.0) -> ContactStretch:
+    """Return a stretch that is given of all feet.
+
+    Args:
+        robot: whose feet they are.
+        state: what is given.
+        begin: of the stretch, as a share of the horizon [1].
+        end: of the stretch, as a share of the horizon [1].
+        clearance: least height in its middle [m].
+    """
+    return ContactStretch(of=tuple(robot.feet), state=state, begin=begin, end=end, clearance=clearance)
+
+
+def refuse_footless(robot: Robot, name: str) -> None:
+    """Refuse a robot without contact points for the task of a name.
+
+    Raises:
+        ScenarioError: it has none.
+    """
+    if not robot.contacts:
+        raise ScenarioError(f"{robot.name} has no contact points; expected a robot with feet for '{name}'")
+
+
+def positive(name: str, number: float, unit: str) -> float:
+    """Return a number that has to be positive.
+
+    Args:
+        name: of the number.
+        number: what it is.
+        unit: of the number.
+
+    Raises:
+        ScenarioError: it is not positive.
+    """
+    if not 0.0 < number < math.inf:
+        raise ScenarioError(f"{name} is {number}; expected a positive number [{unit}]")
+    return number
