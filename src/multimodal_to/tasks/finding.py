@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
 from typing import Any, get_type_hints
 
 from multimodal_to.arguments import checked
@@ -11,7 +12,7 @@ from multimodal_to.errors import ScenarioError, unknown
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.bundled import SCENARIOS
 from multimodal_to.scenarios.bundled import find as bundled
-from multimodal_to.scenarios.data import RECORDS
+from multimodal_to.scenarios.data import HEIGHTS, RECORDS
 from multimodal_to.scenarios.files import change, parted
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.tasks import in_air, on_feet
@@ -69,8 +70,10 @@ def find(name: str, robot: Robot, settings: Iterable[str] = ()) -> Scenario:
         key, value = parted(setting)
         if key in hints:
             said[key] = RECORDS.value(hints[key], value, key)
-        else:
+        elif key.partition(".")[0] in (known := [*hints, *(entry.name for entry in fields(Scenario)), *HEIGHTS]):
             rest.append(setting)
+        else:
+            raise ScenarioError(unknown("key", key, known))
     return change(TASKS[name](robot, **said), rest)
 
 

@@ -22,6 +22,9 @@ def com_range(robot: Robot, way: tuple[float, float, float]) -> tuple[float, flo
 def given(robot: Robot, state: ContactState, begin: float, end: float, clearance: float = 0.0) -> ContactStretch:
     """Return a stretch that is given of all feet.
 
+    Feet on legs without joints are not given to stand, but free to: they would be held by more rows than the body has
+    ways to move.
+
     Args:
         robot: whose feet they are.
         state: what is given.
@@ -29,6 +32,8 @@ def given(robot: Robot, state: ContactState, begin: float, end: float, clearance
         end: of the stretch, as a share of the horizon [1].
         clearance: least height in its middle [m].
     """
+    if state is ContactState.ON and not robot.joint_names:
+        state = ContactState.FREE
     return ContactStretch(of=tuple(robot.feet), state=state, begin=begin, end=end, clearance=clearance)
 
 
