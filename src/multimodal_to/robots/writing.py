@@ -80,7 +80,7 @@ def _groups(draft: Draft) -> Iterator[str]:
 
 
 def _home(draft: Draft) -> Iterator[str]:
-    source = "the URDF's zero, or mid-range where zero is outside"
+    source = "the URDF's zero, or near zero where that is outside"
     if draft.state is not None:
         source = f"the state '{draft.state.name}' of {draft.state.source.name}"
     yield ""

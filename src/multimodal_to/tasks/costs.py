@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.units import Units
 from multimodal_to.scenarios.scenario import Weights
 
 ONE = 1e5
 """A weight of one: what costs it is one of the robot's own units, over one unit of time √(L/g)."""
 
 
-def weights(robot: Robot) -> Weights:
+def weights(robot: Robot, units: Units) -> Weights:
     """Return the weights of every starter task for a robot.
 
     What a cost is of is measured in units of m, L and g, and time in √(L/g). So two robots of one shape get one
     objective, whatever their size. Forces are measured in the load of a contact point while all stand.
+
+    Args:
+        robot: with its joints, contact points and jets.
+        units: its own, or those of its flight.
     """
-    units = robot.units
 
     def running(weight: float, unit: str, share: float = 1.0) -> float:
         return ONE * weight / (units.of("s") * (share * units.of(unit)) ** 2)
@@ -38,7 +42,7 @@ def weights(robot: Robot) -> Weights:
         contact_force_rates=running(0.1, "N/s", load),
         thrust_rate=running(0.1, "N/s", thrust),
         throttle_rate=running(10.0, "1/s", 100.0 * thrust),
-        foot_tilt=running(10.0, "1"),
+        foot_tilt=running(10.0, "1") if robot.joint_names else 0.0,
         skimming=running(10.0, "1"),
         initial_posture=at_end(1.0, "rad"),
         final_posture=at_end(10.0, "rad"),

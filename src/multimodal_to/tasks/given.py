@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.units import Units
 from multimodal_to.scenarios.contacts import ContactState, ContactStretch
 
-SPEED = 4.0
+_SPEED = 4.0
 """Greatest speed of the base [√(g L)] and, where that is more, greatest rate [√(g/L)]."""
+_LINE = 0.02
+"""Contact points that are no farther from a line are on it [L]."""
+
+
+def speed_max(units: Units) -> float:
+    """Return the greatest size of each component of the base's twist [m/s, rad/s]."""
+    return _SPEED * max(units.of("m/s"), units.of("rad/s"))
 
 
 def com_range(robot: Robot, way: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -38,13 +48,25 @@ def given(robot: Robot, state: ContactState, begin: float, end: float, clearance
 
 
 def refuse_footless(robot: Robot, name: str) -> None:
-    """Refuse a robot without contact points for the task of a name.
+    """Refuse a robot that does not stand for the task of a name.
 
     Raises:
-        ScenarioError: it has none.
+        ScenarioError: it has no contact points, or all of them are on a line, about which it falls.
     """
     if not robot.contacts:
         raise ScenarioError(f"{robot.name} has no contact points; expected a robot with feet for '{name}'")
+    posture = robot.home
+    places = np.array(
+        [
+            np.array(robot.kindyn.forward_kinematics(one, posture.base_transform, posture.joint_positions))[:2, 3]
+            for one in robot.contact_names
+        ]
+    )
+    if len(places) < 3 or np.linalg.svd(places - places.mean(axis=0))[1][1] < _LINE * robot.standing_height:
+        raise ScenarioError(
+            f"{robot.name} has its contact points on a line, about which it falls; expected feet that hold it upright "
+            f"for '{name}', which starts or ends at rest"
+        )
 
 
 def positive(name: str, number: float, unit: str) -> float:

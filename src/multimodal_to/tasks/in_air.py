@@ -1,8 +1,13 @@
-"""Starter tasks in the air, by the robot's jets."""
+"""Starter tasks in the air, by the robot's jets.
+
+Lengths are in ℓ: the standing height L, or the mean distance of the jets from the CoM where that is more, as for a flat
+drone whose legs are short.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,22 +16,23 @@ from multimodal_to.arguments import checked
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.turbines import spool_up
+from multimodal_to.models.units import Units
 from multimodal_to.scenarios.contacts import ContactState
 from multimodal_to.scenarios.keyframes import HOME
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 from multimodal_to.tasks.costs import weights
-from multimodal_to.tasks.given import SPEED, com_range, given, positive, refuse_footless
+from multimodal_to.tasks.given import com_range, given, positive, refuse_footless, speed_max
 
 HEIGHT = 0.5
-"""How high a robot takes off, and from where it lands, by default [L]."""
+"""How high a robot takes off, and from where it lands, by default [ℓ]."""
 ACCELERATION = 0.1
 """How hard the CoM speeds up and slows down on its way [g]."""
 SETTLING = 3.0
-"""How long the robot has to become still at the end, beside the way [√(L/g)]."""
+"""How long the robot has to become still at the end, beside the way [√(ℓ/g)]."""
 _INTERVALS = 40
 """Into how many intervals the way is divided, and as many the time before it or after it on the ground."""
 _LONGEST, _TIMES = 60.0, 600
-"""How long engines are looked at [√(L/g)], and how often."""
+"""How long engines are looked at [√(ℓ/g)], and how often."""
 
 
 @checked
@@ -34,13 +40,13 @@ def hover(robot: Robot, *, by: Vector3 | None = None) -> Scenario:
     """Return a way through the air, from a hover to a hover.
 
     Args:
-        robot: that flies; it starts L above home, where it has feet.
-        by: how far it gets in the world [m]; L along x where it is not said.
+        robot: that flies; it starts ℓ above home, where it has feet.
+        by: how far it gets in the world [m]; ℓ along x where it is not said.
 
     Raises:
         ScenarioError: the robot has no jets, or jets that cannot carry it, or the way is no finite one.
     """
-    length = robot.standing_height
+    length = _units(robot).length
     by = (length, 0.0, 0.0) if by is None else by
     if not all(map(math.isfinite, by)):
         raise ScenarioError(f"by is {by}; expected three finite numbers [m]")
@@ -65,13 +71,13 @@ def take_off(robot: Robot, *, height: float | None = None) -> Scenario:
 
     Args:
         robot: that takes off.
-        height: how far its CoM rises above home [m]; 0.5 L where it is not said.
+        height: how far its CoM rises above home [m]; 0.5 ℓ where it is not said.
 
     Raises:
         ScenarioError: the robot has no feet, no jets, or jets that cannot carry it, or the height is not positive.
     """
     refuse_footless(robot, "take-off")
-    height = positive("height", HEIGHT * robot.standing_height if height is None else height, "m")
+    height = positive("height", HEIGHT * _units(robot).length if height is None else height, "m")
     return _in_air(
         robot,
         "take-off",
@@ -90,13 +96,13 @@ def land(robot: Robot, *, height: float | None = None) -> Scenario:
 
     Args:
         robot: that lands.
-        height: how far its CoM is above home at the start [m]; 0.5 L where it is not said.
+        height: how far its CoM is above home at the start [m]; 0.5 ℓ where it is not said.
 
     Raises:
         ScenarioError: the robot has no feet, no jets, or jets that cannot carry it, or the height is not positive.
     """
     refuse_footless(robot, "land")
-    height = positive("height", HEIGHT * robot.standing_height if height is None else height, "m")
+    height = positive("height", HEIGHT * _units(robot).length if height is None else height, "m")
     return _in_air(
         robot,
         "land",
@@ -109,9 +115,24 @@ def land(robot: Robot, *, height: float | None = None) -> Scenario:
     )
 
 
+def _units(robot: Robot) -> Units:
+    """Return the robot's own units with ℓ as the length."""
+    com, home = robot.com_at(robot.home), robot.home
+    away = [
+        float(
+            np.linalg.norm(
+                np.array(robot.kindyn.forward_kinematics(jet.frame, home.base_transform, home.joint_positions))[:3, 3]
+                - com
+            )
+        )
+        for jet in robot.jets
+    ]
+    return replace(robot.units, length=max(robot.standing_height, float(np.mean(away or [0.0]))))
+
+
 def _way_time(robot: Robot, distance: float) -> float:
     """Return how long a way takes from rest to rest [s]: 2 √(d / a), and the time to become still."""
-    units = robot.units
+    units = _units(robot)
     return 2.0 * math.sqrt(distance / (ACCELERATION * units.gravity)) + SETTLING * units.of("s")
 
 
@@ -127,7 +148,7 @@ def _spool_up_time(robot: Robot, name: str) -> float:
     """
     if not robot.jets:
         raise ScenarioError(f"{robot.name} has no jets; expected some for '{name}'")
-    unit = robot.units.of("s")
+    unit = _units(robot).of("s")
     times = unit * np.linspace(0.0, _LONGEST, _TIMES + 1)[1:]
     lift = spool_up(robot.jets, times).sum(axis=0)
     enough = np.flatnonzero(lift > robot.weight)
@@ -182,8 +203,8 @@ def _in_air(
         terminal=terminal,
         interval_min=interval,
         interval_max=interval,
-        weights=weights(robot),
-        base_speed_max=SPEED * max(robot.units.of("m/s"), robot.units.of("rad/s")),
+        weights=weights(robot, _units(robot)),
+        base_speed_max=speed_max(_units(robot)),
         com_range=com_range(robot, (abs(to_x - x), abs(to_y - y), max(z, to_z))),
         **more,
     )

@@ -13,7 +13,7 @@ from multimodal_to.scenarios.gaits import GaitKind, GaitPlan, groups_of
 from multimodal_to.scenarios.keyframes import HOME, Keyframe
 from multimodal_to.scenarios.scenario import Margins, Scenario, Terminal
 from multimodal_to.tasks.costs import weights
-from multimodal_to.tasks.given import SPEED, com_range, given, positive, refuse_footless
+from multimodal_to.tasks.given import com_range, given, positive, refuse_footless, speed_max
 
 DEPTH, HEIGHT = 0.2, 0.15
 """How far a robot squats and jumps by default [L]."""
@@ -64,7 +64,7 @@ def jump(robot: Robot, *, height: float | None = None) -> Scenario:
             f"{robot.name} is without gravity; expected some for a jump, which ends where it falls back"
         )
     flight = 2.0 * math.sqrt(2.0 * height / strength) * robot.rate_unit  # in units of time
-    in_air, before = max(round(flight / 0.08), 4), 30
+    in_air, before = max(round(flight / 0.06), 4), 40
     knots = 2 * before + in_air
     begin, end = before / knots, (before + in_air) / knots
     return _on_feet(
@@ -175,8 +175,8 @@ def _on_feet(robot: Robot, name: str, title: str, *, knots: int, interval: float
         terminal=Terminal.STANDING,
         interval_min=interval * time,
         interval_max=interval * time,
-        weights=weights(robot),
-        base_speed_max=SPEED * max(robot.units.of("m/s"), robot.units.of("rad/s")),
+        weights=weights(robot, robot.units),
+        base_speed_max=speed_max(robot.units),
         com_range=com_range(robot, way),
         **more,
     )
