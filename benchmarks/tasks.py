@@ -2,8 +2,8 @@
 
     python benchmarks/tasks.py [ROBOT ...] [--task TASK ...] [--keep DIR] [--into docs/tasks.md]
 
-Needs the packages `example-robot-data` and `icub-models`. Of each robot only the path of its URDF is given, and of a drone
-the links with its engines. Seconds are processor time of the solve; iterations do not depend on the machine. `--keep`
+Needs the packages `example-robot-data` and `icub-models`. Of each robot only its URDF is given, and of a drone
+the links of its engines. Seconds are processor time of the solve; iterations do not depend on the machine. `--keep`
 writes the robots' folders and the motions, to look at.
 """
 
