@@ -181,9 +181,14 @@ class Robot(Value):
 
     @cached_property
     def units(self) -> Units:
-        """Return the robot's own units: m, L and g."""
+        """Return the robot's own units: m, L and g, and how many contact points share the weight."""
         strength = float(np.linalg.norm(self.gravity))
-        return Units(mass=self.mass, length=self.standing_height, gravity=strength or EARTH)
+        return Units(
+            mass=self.mass,
+            length=self.standing_height,
+            gravity=strength or EARTH,
+            contact_points=max(len(self.contacts), 1),
+        )
 
     @cached_property
     def home_com(self) -> tuple[float, float, float]:

@@ -36,10 +36,10 @@ Vector3 = tuple[float, float, float]
 
 MOST_KNOTS = 10_000
 """More knots than this are a slip of the pen, and would fill any memory."""
-COMPLEMENTARITY = 2e-5
-"""ε_n where a scenario says none [m g L]: half of what the audit lets height × normal force be."""
-SLIDING = 8e-6
-"""ε_t where a scenario says none [m g L]: tighter, because slips add up while a foot stands."""
+COMPLEMENTARITY = 1.6e-4
+"""ε_n where a scenario says none [m g L / n]: half of what the audit lets height × normal force be."""
+SLIDING = 6.4e-5
+"""ε_t where a scenario says none [m g L / n]: tighter, because slips add up while a foot stands."""
 _LONGEST_NAME = 100
 
 
@@ -217,9 +217,9 @@ class Scenario:
     friction_cone: FrictionCone = FrictionCone.PYRAMID
     """Which forces a contact point can bear without slipping."""
     complementarity_max: float | None = None
-    """ε_n, greatest height × normal force of a contact point [N m]; where there is none, 2e-5 m g L of the robot."""
+    """ε_n, greatest height × normal force of a contact point [N m]; where there is none, 1.6e-4 m g L / n."""
     sliding_max: float | None = None
-    """ε_t, greatest slip over an interval × normal force [N m]; where there is none, 8e-6 m g L of the robot."""
+    """ε_t, greatest slip over an interval × normal force [N m]; where there is none, 6.4e-5 m g L / n."""
     base_speed_max: float = 2.0
     """Greatest size of each component of the base's twist [m/s, rad/s]."""
     com_range: Vector3 = (1.5, 1.5, 1.5)
@@ -256,8 +256,12 @@ class Scenario:
 
     @checked
     def contact_bounds(self, robot: Robot) -> tuple[float, float]:
-        """Return ε_n and ε_t [N m]; those that the scenario leaves open are `COMPLEMENTARITY` and `SLIDING` m g L."""
-        unit = robot.weight * robot.standing_height
+        """Return ε_n and ε_t [N m]; those left open are `COMPLEMENTARITY` and `SLIDING` of m g L / n.
+
+        n is the number of contact points, so that a point that bears its share of the weight is let as near to the
+        ground by every robot.
+        """
+        unit = robot.weight * robot.standing_height / max(len(robot.contacts), 1)
         return self.complementarity_max or COMPLEMENTARITY * unit, self.sliding_max or SLIDING * unit
 
     # ---------------------------------------------------------------- keyframes
