@@ -17,7 +17,9 @@ from multimodal_to.tasks.given import com_range, given, positive, refuse_footles
 
 DEPTH, HEIGHT = 0.2, 0.15
 """How far a robot squats and jumps by default [L]."""
-STRIDE = {GaitKind.WALK: 0.4, GaitKind.TROT: 0.5, GaitKind.BOUND: 0.5, GaitKind.JUMP: 0.3}
+DISTANCE = {GaitKind.WALK: 0.8, GaitKind.TROT: 1.5, GaitKind.BOUND: 0.8, GaitKind.JUMP: 0.6}
+"""How far it gets by default [L]."""
+STRIDE = {GaitKind.WALK: 0.4, GaitKind.TROT: 0.8, GaitKind.BOUND: 0.5, GaitKind.JUMP: 0.3}
 """How far each foot goes at most from one standing place to the next [L]."""
 
 
@@ -106,7 +108,8 @@ def walk(robot: Robot, *, distance: float | None = None, gait: GaitKind = GaitKi
 
     Args:
         robot: that walks.
-        distance: how far it gets along x of the world, backwards where it is negative [m]; 0.8 L where it is not said.
+        distance: how far it gets along x of the world, backwards where it is negative [m]; where it is not said,
+            `DISTANCE` of the gait.
         gait: which feet swing together.
 
     Raises:
@@ -114,7 +117,7 @@ def walk(robot: Robot, *, distance: float | None = None, gait: GaitKind = GaitKi
     """
     _refuse_stiff(robot, f"a {gait.value}")
     length = robot.standing_height
-    distance = 0.8 * length if distance is None else distance
+    distance = DISTANCE[gait] * length if distance is None else distance
     rounds = max(math.ceil(abs(distance) / (STRIDE[gait] * length) - 1e-9), 1)
     return _gait(robot, gait.value, f"{gait.value.capitalize()} of {distance:.3g} m", gait, (distance, 0.0), rounds)
 
@@ -125,7 +128,7 @@ def trot(robot: Robot, *, distance: float | None = None) -> Scenario:
 
     Args:
         robot: that trots.
-        distance: how far it gets along x of the world, backwards where it is negative [m]; 0.8 L where it is not said.
+        distance: how far it gets along x of the world, backwards where it is negative [m]; 1.5 L where it is not said.
 
     Raises:
         ScenarioError: the robot has no legs, or not four feet.
@@ -148,7 +151,7 @@ def _gait(robot: Robot, name: str, title: str, kind: GaitKind, way: tuple[float,
     each, interval = _PACE[kind]
     steps, still = rounds * len(groups_of(robot, kind)), round(_AT_REST / interval)
     knots = 2 * still + each * steps
-    plan = GaitPlan(kind=kind, steps=steps, begin=still / knots, end=1.0 - still / knots)
+    plan = GaitPlan(kind=kind, steps=steps, begin=still / knots, end=1.0 - still / knots, clearance=robot.gait.lift)
     return _on_feet(
         robot,
         name,
