@@ -1,4 +1,4 @@
-"""Contacts that are given: Solo12 trots 0.3 m, a starter task of any robot on four feet, and what MuJoCo makes of it."""
+"""Contacts that are given: Solo12 trots 0.3 m, as any robot on four feet can, and what MuJoCo makes of it."""
 
 from pathlib import Path
 

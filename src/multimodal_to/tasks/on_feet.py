@@ -158,7 +158,7 @@ def _gait(robot: Robot, name: str, title: str, kind: GaitKind, way: tuple[float,
         title,
         knots=knots,
         interval=interval,
-        margins=Margins() if kind is GaitKind.WALK else Margins(touch_down_speed=0.25),
+        margins=Margins(touch_down_speed=0.15 if kind is GaitKind.WALK else 0.25),
         final_com_shift=(*way, 0.0),
         gait=plan,
     )
