@@ -605,10 +605,21 @@ def _proportions(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> 
     contacts, jets = _from_com(file, kindyn, home)
     height = proportions.standing_height(contacts, jets)
     return (
-        proportions.contact_reach(contacts, height) if reach.contacts is None else np.array(reach.contacts),
-        proportions.jet_reach(jets, height) if reach.jets is None else np.array(reach.jets),
+        _contact_reach(file, contacts, height) if reach.contacts is None else np.array(reach.contacts),
+        proportions.turned_reach(jets, height) if reach.jets is None else np.array(reach.jets),
         Gait(lift=proportions.LIFT * height if gait.lift is None else gait.lift, swing=gait.swing),
     )
+
+
+def _contact_reach(file: RobotFile, contacts: Array, height: float) -> Array:
+    """Return the default reach of contact points [m], (3,); those that no joint moves tilt with the body, as jets do.
+
+    Args:
+        file: with its joints.
+        contacts: offsets of the contact points [m], (contacts, 3).
+        height: L [m].
+    """
+    return (proportions.contact_reach if file.joints else proportions.turned_reach)(contacts, height)
 
 
 def _offsets(kindyn: KinDynComputations, posture: Posture, frames: Sequence[str]) -> Array:
