@@ -33,14 +33,16 @@ def walk() -> Iterator[tuple[str, Robot, mt.Scenario]]:
 
 def trot() -> Iterator[tuple[str, Robot, mt.Scenario]]:
     """Give the trot of Solo12; where it is found, its feet skim, and the start guess steps as often."""
-    robot, given = mt.load_robot("solo12"), mt.scenario_files.load(EXAMPLES / "trot.toml")
+    robot = mt.load_robot("solo12")
+    given = mt.tasks.trot(robot, distance=0.3)
     yield "found", robot, replace(given, gait=None, guess_steps=8)
     yield "given", robot, given
 
 
 def mixed() -> Iterator[tuple[str, Robot, mt.Scenario]]:
     """Give the trot with three feet given and one found."""
-    robot, given = mt.load_robot("solo12"), mt.scenario_files.load(EXAMPLES / "trot.toml")
+    robot = mt.load_robot("solo12")
+    given = mt.tasks.trot(robot, distance=0.3)
     free = mt.ContactStretch(of=("front_left",), state=mt.ContactState.FREE)
     yield "three feet given, one found", robot, replace(given, contacts=(free,))
 

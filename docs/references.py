@@ -15,7 +15,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from multimodal_to.adam import urdf
-from multimodal_to.auditing import PROPERTIES, Judged, Of, Property
+from multimodal_to.auditing import PROPERTIES, Judged, Property
 from multimodal_to.files.keys import Key
 from multimodal_to.files.reading import LARGEST_TOML
 from multimodal_to.models.joint_units import either
@@ -156,7 +156,7 @@ def properties() -> str:
 
 def _limit(entry: Property) -> str:
     unit = either(entry.unit) if entry.of_joints else entry.unit
-    share = unit if entry.of is Of.UNIT else entry.of.value
+    share = unit if entry.counted_in == entry.unit else entry.counted_in
     margin = "" if entry.margin is None else f"`margins.{entry.margin}` + "
     others = {
         "second-order cone": entry.second_order_limit,

@@ -1,4 +1,4 @@
-"""Contacts that are given: Solo12 trots 0.3 m, as `trot.toml` says, and what MuJoCo makes of it."""
+"""Contacts that are given: Solo12 trots 0.3 m, as any robot on four feet can, and what MuJoCo makes of it."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from multimodal_to.trajectory.derived import footsteps
 folder = Path("results/trot")
 folder.mkdir(parents=True, exist_ok=True)
 robot = mt.load_robot("solo12")
-trot = mt.scenario_files.load(Path(__file__).parent / "trot.toml")
+trot = mt.tasks.trot(robot, distance=0.3)
 problem = mt.build(robot, trot)
 solution = mt.solve(problem)
 print(solution.status.value, "after", solution.iterations, "iterations in", round(solution.solve_time, 1), "s")

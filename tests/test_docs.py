@@ -12,7 +12,7 @@ import pytest
 
 import multimodal_to as mt
 from multimodal_to.adam.urdf import LARGEST_URDF
-from multimodal_to.auditing import PROPERTIES, Of
+from multimodal_to.auditing import PROPERTIES
 from multimodal_to.files.reading import LARGEST_TOML
 from multimodal_to.models.joint_units import either
 from multimodal_to.models.terrain import SURFACES
@@ -84,9 +84,8 @@ def test_every_property_of_the_audit_is_on_its_page_with_the_limit_that_judges(i
     for finding in mt.audit(ironcub, take_off.trajectory).findings:
         row = next(line for line in text.splitlines() if line.startswith(f"| `{finding.name}` |"))
         entry = PROPERTIES[finding.name]
-        share = entry.unit if entry.of is Of.UNIT else entry.of.value
         asked = 0.0 if entry.margin is None else getattr(mt.scenarios.take_off().margins, entry.margin)
-        stated = f"{finding.limit / entry.of.size(ironcub) - asked:g} {share}".removesuffix(" 1")
+        stated = f"{finding.limit / entry.of.size(ironcub) - asked:g} {entry.counted_in}".removesuffix(" 1")
         assert (f" `margins.{entry.margin}` + {stated}" if asked else f" {stated}") in row
         assert entry.reason in row
     assert all(f"| `{name}` |" in text for name in PROPERTIES)

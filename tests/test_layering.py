@@ -19,7 +19,7 @@ FLOORS = [
     {"models"},
     {"trajectory"},
     {"scenarios", "exporting"},
-    {"ocp", "auditing", "simulation", "replay"},
+    {"ocp", "auditing", "simulation", "replay", "tasks"},
     {"solving"},
     {"doctor", "plotting", "sweeping"},
     {"reporting", "robots"},

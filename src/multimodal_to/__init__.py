@@ -10,7 +10,7 @@ trajectory and the robot.
 from multimodal_to import ending  # noqa: F401
 
 # isort: on
-from multimodal_to import robots, scenarios
+from multimodal_to import robots, scenarios, tasks
 from multimodal_to.adam import KinDynComputations
 from multimodal_to.auditing import Audit, audit
 from multimodal_to.doctor import Diagnosis, doctor
@@ -138,5 +138,6 @@ __all__ = [
     "standing_posture",
     "state_at",
     "sweep",
+    "tasks",
     "write_motion",
 ]

@@ -14,6 +14,7 @@ from multimodal_to.auditing import PROPERTIES, audit, link_clearances
 from multimodal_to.auditing.properties import judged
 from multimodal_to.auditing.solids import hull, solid_clearances, urdf_solids
 from multimodal_to.errors import OutputError
+from multimodal_to.models.units import REFERENCE
 
 KNOT = 7
 
@@ -77,7 +78,8 @@ def test_every_pair_is_reported_with_its_least_distance_and_the_nearest_first(ir
 def test_a_robot_without_capsules_is_not_judged_by_them(tmp_path):
     bare = drone(tmp_path)
     assert "link distance" not in judged(None, bare)
-    assert PROPERTIES["link distance"].limit_for(bare, None) == 1e-4
+    share = bare.standing_height / REFERENCE.length
+    assert PROPERTIES["link distance"].limit_for(bare, None) == pytest.approx(1e-4 * share)
 
 
 # -------------------------------------------------------------------- solids

@@ -301,11 +301,17 @@ def test_limits_are_as_strict_for_a_small_robot_as_for_a_large_one(ironcub, tmp_
     small, scenario = solo(tmp_path), scenarios.take_off()
     lighter, shorter = small.weight / ironcub.weight, small.standing_height / ironcub.standing_height
     shares = {Of.WEIGHT: lighter, Of.HEIGHT: shorter, Of.MOMENT: lighter * shorter, Of.SPEED: shorter**0.5}
+    by_points = len(ironcub.contacts) / len(small.contacts)
+    shares[Of.POINT_MOMENT] = by_points * lighter * shorter
+    sizes = {"m": shorter, "m/s": shorter**0.5, "N": lighter, "N/s": lighter / shorter**0.5, "1": 1.0, "rad": 1.0}
+    points = {"N": by_points * lighter}
     assert lighter < 0.1
     for entry in PROPERTIES.values():
-        if entry.of in shares:
+        units = {Of.SIZE: sizes, Of.POINT: points}.get(entry.of, {})
+        if entry.of in shares or entry.unit in units:
+            share = shares[entry.of] if entry.of in shares else units[entry.unit]
             large = entry.limit_for(ironcub, scenario)
-            assert entry.limit_for(small, scenario) == pytest.approx(shares[entry.of] * large), entry.name
+            assert entry.limit_for(small, scenario) == pytest.approx(share * large, rel=1e-3), entry.name
     assert {entry.of for entry in PROPERTIES.values()} == set(Of)
 
 

@@ -142,7 +142,7 @@ def completions(line, folder):
         ("multimodal-to re", ["reproduce", "replay", "report"]),
         ("multimodal-to solve ta", ["take-off", "take-off-and-landing"]),
         ("multimodal-to solve m", ["mine.toml"]),
-        ("multimodal-to doctor s", ["step-up"]),
+        ("multimodal-to doctor s", ["step-up", "squat", "step"]),
         ("multimodal-to show j", ["jump", "jump.npz"]),
         ("multimodal-to solve jump --linear-solver m", ["mumps", "ma27", "ma57", "ma77", "ma86", "ma97"]),
         ("multimodal-to reproduce take-off st", ["step-up"]),

@@ -102,6 +102,8 @@ def test_a_quadrotor_has_rotors_that_push_up_and_holds_its_propellers_still(tmp_
     assert sum(jet.thrust_max for jet in robot.jets) == pytest.approx(2.0 * robot.weight, rel=0.03)
     assert any("iris__rotor_0_joint" in note for note in result.notes)
     assert len(robot.contacts) == 4
+    assert sum(np.sign(jet.drag) for jet in robot.jets) == 0  # two turn each way, so that it can turn about z
+    assert min(abs(jet.drag) for jet in robot.jets) > 0
 
 
 @pytest.mark.parametrize("name", ARMS)

@@ -30,7 +30,6 @@ from multimodal_to.simulation.controller import Belief, drawn
 from multimodal_to.simulation.look_ahead import Feedback, LookAhead
 from multimodal_to.simulation.noise import Estimate, Noise
 from multimodal_to.simulation.reference import reference
-from multimodal_to.simulation.units import Units
 from multimodal_to.trajectory.resampling import resample
 from synthetic import take_off as synthetic_take_off
 
@@ -58,7 +57,7 @@ class Holding:
         return 5e-3
 
     def reset(self, robot, plan, since):
-        units, self.robot = Units.of(robot), robot
+        units, self.robot = robot.units, robot
         count = len(robot.joint_names)
         self.servos = Servos(
             positions=plan.joint_positions[:, 0],
@@ -139,9 +138,9 @@ def test_drawn_gains_are_each_within_their_spread():
 
 def test_gains_are_those_of_the_robots_own_size(ironcub):
     """A robot twice as heavy has servos twice as stiff; 300 N m/rad are right for the iRonCub alone."""
-    units = Units.of(ironcub)
+    units = ironcub.units
     assert ServoGains().stiffness * units.moment == pytest.approx(300.0, rel=0.05)
-    assert Units(mass=2 * units.mass, gravity=units.gravity, length=units.length).moment == 2 * units.moment
+    assert replace(units, mass=2 * units.mass).moment == 2 * units.moment
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,9 @@
 The findings take unit and limit from this table, and the reference page of the audit is made from it.
 
 Many limits follow from the solver. It counts a motion as feasible when no row is missed by more than 1e-5 of the row's
-scale (`solving.solver.FEASIBLE`). That is 1e-5 m, rad, m/s or kg m²/s, and 5e-4 N or N/s for rows with a scale of 50:
-for every robot, so that these limits are in the property's unit. The others are shares of the robot's size (`Of`).
+scale (`solving.solver.FEASIBLE`). For the iRonCub that is 1e-5 m, rad, m/s or kg m²/s, and 5e-4 N or N/s for rows with
+a scale of 50. The scales grow and shrink with the robot, and so do these limits. The others are shares of the robot's
+size (`Of`).
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory.derived import LOADED_SHARE
 from multimodal_to.values import FrozenMapping
 
-_FEASIBLE = "what a feasible motion may miss its row by, the same for every robot"
-_TWICE_FEASIBLE = "twice what a feasible motion may miss its row by, the same for every robot"
+_FEASIBLE = "what a feasible motion may miss its row by"
+_TWICE_FEASIBLE = "twice what a feasible motion may miss its row by"
 _BOUND = "a bound, which the solver holds; the limit is for rounding"
 
 _PHYSICS = (
@@ -41,8 +42,7 @@ _PHYSICS = (
         name="momentum consistency",
         unit="kg m²/s",
         limit=1e-4,
-        reason="ten times what a feasible motion may miss its row by, the same for every robot, since the CoM's own "
-        "miss enters too",
+        reason="ten times what a feasible motion may miss its row by, since the CoM's own miss enters too",
         meaning="difference of the stored angular momentum hω from J_CMM(q) ν",
     ),
     Property(
@@ -104,14 +104,14 @@ _PHYSICS = (
 )
 
 GAPS = (
-    ("com_position", "com_velocity", "m", 1e-5, Of.UNIT),
-    ("com_velocity", "com_acceleration", "m/s", 1e-5, Of.UNIT),
-    ("angular_momentum", "angular_momentum_rate", "kg m²/s", 1e-5, Of.UNIT),
-    ("base_position", "base_linear_velocity", "m", 1e-5, Of.UNIT),
-    ("joint_positions", "joint_velocities", "rad", 1e-5, Of.UNIT),
+    ("com_position", "com_velocity", "m", 1e-5, Of.SIZE),
+    ("com_velocity", "com_acceleration", "m/s", 1e-5, Of.SIZE),
+    ("angular_momentum", "angular_momentum_rate", "kg m²/s", 1e-5, Of.SIZE),
+    ("base_position", "base_linear_velocity", "m", 1e-5, Of.SIZE),
+    ("joint_positions", "joint_velocities", "rad", 1e-5, Of.SIZE),
     ("contact_forces", "contact_force_rates", "N", 2.3e-6, Of.WEIGHT),
-    ("thrust", "thrust_rate", "N", 1e-3, Of.UNIT),
-    ("thrust_rate", "thrust_acceleration", "N/s", 1e-3, Of.UNIT),
+    ("thrust", "thrust_rate", "N", 1e-3, Of.SIZE),
+    ("thrust_rate", "thrust_acceleration", "N/s", 1e-3, Of.SIZE),
 )
 """The quantities that a rule integrates: name, its rate, unit and limit of what is left, and the limit's `Of`."""
 _DIFFERENCES = ("com_acceleration", "angular_momentum_rate", "contact_force_rates", "thrust_acceleration")
@@ -165,6 +165,7 @@ _ACTUATION_AND_CONTACT = (
         name="pulling normal force",
         unit="N",
         limit=1e-3,
+        of=Of.POINT,
         reason=_TWICE_FEASIBLE,
         meaning="contact force towards the ground's inside, −n·f",
     ),
@@ -173,6 +174,7 @@ _ACTUATION_AND_CONTACT = (
         unit="N",
         limit=1e-3,
         second_order_limit=1e-2,
+        of=Of.POINT,
         reason=f"{_TWICE_FEASIBLE}; under the second-order cone more, because a row of squares is met less sharply "
         "where forces vanish",
         meaning="|t·f| − μ n·f under the scenario's cone and friction",
@@ -180,8 +182,8 @@ _ACTUATION_AND_CONTACT = (
     Property(
         name="normal force × height",
         unit="N m",
-        limit=4e-5,
-        of=Of.MOMENT,
+        limit=3.2e-4,
+        of=Of.POINT_MOMENT,
         reason="twice the default of `complementarity_max`",
         meaning="normal force of a contact point × its height, under leapfrog the greatest height of its knot and the "
         "two beside it, within which the force acts: force in the air",
@@ -338,7 +340,8 @@ def _hovering(when: str, condition: Judged) -> tuple[Property, ...]:
             name=f"{when}: contact force",
             unit="N",
             limit=0.011,
-            reason="the problem leaves 0.01 N, the same for every robot; a tenth of that for rounding",
+            of=Of.POINT,
+            reason="the problem leaves 0.01 N; a tenth of that for rounding",
             meaning="largest component of a contact force",
             judged=condition,
         ),
@@ -356,7 +359,7 @@ def _hovering(when: str, condition: Judged) -> tuple[Property, ...]:
             name=f"{when}: thrust off weight",
             unit="N",
             limit=0.1,
-            reason="the problem leaves 0.01 N at each contact point, the same for every robot; enough for ten",
+            reason="the problem leaves 0.01 N at each contact point; enough for ten",
             meaning="sum of the thrusts plus m g, largest component",
             judged=condition,
         ),

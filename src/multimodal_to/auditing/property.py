@@ -11,6 +11,7 @@ from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.joint_units import joint_units
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.sole import soles
+from multimodal_to.models.units import Sized
 from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal
 from multimodal_to.trajectory import rules
 
@@ -71,27 +72,38 @@ class Judged(Enum):
 class Of(Enum):
     """What a limit is a share of, so that it is as strict for a small robot as for a large one; the value names it."""
 
-    UNIT = ""
-    """Nothing: the limit is in the property's unit."""
+    SIZE = ""
+    """Nothing: the limit is in the property's unit for a robot of the iRonCub's size, and grows and shrinks with it."""
+    POINT = "of a contact point"
+    """The same for what goes by the load of one contact point."""
     WEIGHT = "m g"
     """The robot's weight [N]."""
     HEIGHT = "L"
     """Its standing height [m]."""
     MOMENT = "m g L"
     """Its weight at an arm of its standing height [N m]."""
+    POINT_MOMENT = "m g L / n"
+    """The share of one contact point in the weight, at an arm of the standing height [N m]."""
     SPEED = "√(g L)"
     """Its unit of speed [m/s]."""
     THRUST = "of the least `thrust_max`"
     """The greatest thrust of its smallest jet [N]; without jets it is infinite."""
 
     @checked
-    def size(self, robot: Robot) -> float:
-        """Return how much it is for a robot."""
+    def size(self, robot: Robot, unit: str = "1") -> float:
+        """Return how much it is for a robot.
+
+        Args:
+            robot: whose size it is.
+            unit: of the property; of several, as of a twist, the greatest.
+        """
+        if self in (Of.SIZE, Of.POINT):
+            return max(Sized(1.0, part, self is Of.POINT).of(robot.units) for part in unit.split(", "))
         return {
-            Of.UNIT: 1.0,
             Of.WEIGHT: robot.weight,
             Of.HEIGHT: robot.standing_height,
             Of.MOMENT: robot.weight * robot.standing_height,
+            Of.POINT_MOMENT: robot.weight * robot.standing_height / max(len(robot.contacts), 1),
             Of.SPEED: robot.speed_unit,
             Of.THRUST: min((jet.thrust_max for jet in robot.jets), default=math.inf),
         }[self]
@@ -107,12 +119,17 @@ class Property:
     reason: str  # where the limit comes from
     meaning: str  # what is compared with the limit
     judged: Judged = Judged.ALWAYS
-    of: Of = Of.UNIT
+    of: Of = Of.SIZE
     of_joints: bool = False  # the body of a finding is a joint, which has its own unit
     margin: str | None = None  # of the scenario's `Margins`: the limit is that much more
     unasked: float = 0.0  # what stands for the margin where the scenario is not known or asks for none
     second_order_limit: float | None = None  # the limit under the second-order friction cone, where it is another one
     first_order_limit: float | None = None  # the limit by an integration rule of order one, where it is another one
+
+    @property
+    def counted_in(self) -> str:
+        """Return what the limit is a number of: the property's unit, or what it is a share of."""
+        return self.unit if self.of in (Of.SIZE, Of.POINT) else self.of.value
 
     @checked
     def unit_for(self, robot: Robot, body: str) -> str:
@@ -143,4 +160,4 @@ class Property:
         if self.margin is not None:
             asked: float = getattr(scenario.margins, self.margin) if scenario else 0.0
             limit += asked or self.unasked
-        return limit * self.of.size(robot)
+        return limit * self.of.size(robot, self.unit)

@@ -18,7 +18,7 @@ REGIONS = (
         name="beyond a wall or a box",
         unit="m",
         limit=1e-5,
-        reason="what a feasible motion may miss its row by, the same for every robot; smooth distances are shorter",
+        reason="what a feasible motion may miss its row by; smooth distances are shorter",
         meaning="how much nearer than its `distance` a capsule or an origin is to a face that it has to keep away from",
         judged=Judged.WITH_REGIONS,
     ),

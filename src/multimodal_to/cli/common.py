@@ -19,10 +19,12 @@ from multimodal_to.errors import InputError, OutputError, TrajectoryError, short
 from multimodal_to.exporting.reading import flavours_of, read_motion
 from multimodal_to.files.numbers import number, whole_number
 from multimodal_to.models.robot import Robot, load_robot
-from multimodal_to.scenarios import find
+from multimodal_to.scenarios import find as bundled
 from multimodal_to.scenarios import paper as as_in_paper
 from multimodal_to.scenarios.files import change, load
 from multimodal_to.scenarios.scenario import Margins, Scenario
+from multimodal_to.tasks import TASKS, find
+from multimodal_to.tasks.finding import refuse_unknown
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.archive import read_archive
 from multimodal_to.trajectory.conditions import under_conditions
@@ -44,40 +46,45 @@ _Value = TypeVar("_Value", int, float)
 
 File = Annotated[Path, typer.Argument(help="Trajectory file, as `solve` writes it.")]
 ScenarioName = Annotated[
-    str, typer.Argument(help="Scenario, as `list` shows it, or a TOML file of one.", autocompletion=scenarios_or_files)
+    str, typer.Argument(help="Task, as `list` shows it, or a TOML file of one.", autocompletion=scenarios_or_files)
 ]
 OptionalName = Annotated[
     str | None,
     typer.Argument(
         metavar="NAME",
-        help="Scenario, as `list` shows it, or a TOML file of one; needless with --resume.",
+        help="Task, as `list` shows it, or a TOML file of one; needless with --resume.",
         show_default=False,
         autocompletion=scenarios_or_files,
     ),
 ]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in --set final_com_height=0.8; repeatable."),
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in --set height=0.1; repeatable."),
 ]
 RobotOption = Annotated[
     str, typer.Option("--robot", help="Bundled robot by name, or a robot's folder.", autocompletion=robots_or_folders)
 ]
 
 
-def chosen(name: str, settings: list[str] | None, *, paper: bool = False) -> Scenario:
-    """Return a bundled scenario or that of a file, with the changes asked for.
+def chosen(name: str, settings: list[str] | None, *, robot: str = "", paper: bool = False) -> Scenario:
+    """Return a starter task of the robot, a bundled scenario, or that of a file, with the changes asked for.
 
     Args:
-        name: of the scenario, or its TOML file.
-        settings: changes as `KEY=VALUE`.
+        name: of the task, or its TOML file.
+        settings: changes as `KEY=VALUE`; a key may be an argument of the starter task, as `height=0.1`.
+        robot: name or folder; empty for the iRonCub.
         paper: as the paper's own formulation is solved with it.
     """
     if name.endswith(".toml"):
         scenario = load(name)
         scenario = replace(scenario, margins=Margins.none()) if paper else scenario
-    else:
-        scenario = as_in_paper(name) if paper else find(name)
-    return change(scenario, settings or ())
+        return change(scenario, settings or ())
+    if paper:
+        return change(as_in_paper(name), settings or ())
+    refuse_unknown(name)  # before a robot is read
+    if name in TASKS:
+        return find(name, load_robot(robot or DEFAULT_ROBOT), settings or ())
+    return change(bundled(name), settings or ())
 
 
 def robot_for(scenario: Scenario, option: str, *, file: str = "") -> str:

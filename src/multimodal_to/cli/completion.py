@@ -11,6 +11,7 @@ from multimodal_to.exporting.motion import FLAVOURS
 from multimodal_to.models.robot import bundled_robots
 from multimodal_to.scenarios import SCENARIOS
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS
+from multimodal_to.tasks import TASKS
 
 
 def scenarios(incomplete: str) -> list[str]:
@@ -18,14 +19,19 @@ def scenarios(incomplete: str) -> list[str]:
     return _starting(SCENARIOS, incomplete)
 
 
+def tasks(incomplete: str) -> list[str]:
+    """Return the bundled scenarios and the starter tasks that start so."""
+    return _starting(dict.fromkeys((*SCENARIOS, *TASKS)), incomplete)
+
+
 def scenarios_or_files(incomplete: str) -> list[str]:
-    """Return the bundled scenarios and the TOML files and folders that start so."""
-    return scenarios(incomplete) + _paths(incomplete, (".toml",))
+    """Return the tasks and the TOML files and folders that start so."""
+    return tasks(incomplete) + _paths(incomplete, (".toml",))
 
 
 def scenarios_or_trajectories(incomplete: str) -> list[str]:
-    """Return the bundled scenarios and the TOML files, trajectory files and folders that start so."""
-    return scenarios(incomplete) + _paths(incomplete, (".toml", ".npz"))
+    """Return the tasks and the TOML files, trajectory files and folders that start so."""
+    return tasks(incomplete) + _paths(incomplete, (".toml", ".npz"))
 
 
 def robots_or_folders(incomplete: str) -> list[str]:

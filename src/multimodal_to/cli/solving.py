@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -37,8 +37,8 @@ from multimodal_to.cli.streams import print_json, print_toml
 from multimodal_to.cli.tasks import free_checkpoint, given
 from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
-from multimodal_to.errors import InputError, ScenarioError, apart
-from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.errors import InputError, ScenarioError, apart, listed
+from multimodal_to.models.robot import Robot, bundled_robots, load_robot
 from multimodal_to.native import missing
 from multimodal_to.ocp import Formulation, Problem, build
 from multimodal_to.ocp.integration import LEAPFROG
@@ -50,6 +50,8 @@ from multimodal_to.scenarios.scenario import Scenario, word
 from multimodal_to.solving import Ipopt, Solution, Status, relax
 from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
+from multimodal_to.tasks import BUNDLED_FOR, TASKS
+from multimodal_to.tasks.finding import numbers, refuse_unknown
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.derived import largest_torques
@@ -59,7 +61,7 @@ _VIOLATIONS_SHOWN = 5
 
 @app.command("list")
 def list_scenarios() -> None:
-    """List the bundled scenarios with their numbers.
+    """List the bundled scenarios with their numbers, and the starter tasks of any robot with what can be set.
 
     Example: multimodal-to list
     """
@@ -67,6 +69,16 @@ def list_scenarios() -> None:
     for make in SCENARIOS.values():
         scenario = make()
         table.add_row(scenario.name, f"{scenario.title}\n{_numbers(scenario)}")
+    out.print(table)
+    both, those = listed([name for name in TASKS if name in SCENARIOS]), listed(BUNDLED_FOR)
+    out.print(
+        f"\nStarter tasks of any robot, as in `solve squat --robot DIR`; {both} are those above for {those}:\n",
+        soft_wrap=True,
+    )
+    table = Table(Column(no_wrap=True), Column(), box=None, show_header=False, pad_edge=False)
+    for name, task in TASKS.items():
+        about = (task.__doc__ or "").split("\n", 1)[0].removeprefix("Return ")
+        table.add_row(name, f"{about}\n--set {', '.join(f'{key}=' for key in numbers(name))}")
     out.print(table)
 
 
@@ -86,7 +98,7 @@ def show(
     name: Annotated[
         str,
         typer.Argument(
-            help="Scenario, as `list` shows it, a TOML file of one, or a trajectory file.",
+            help="Task, as `list` shows it, a TOML file of one, or a trajectory file.",
             autocompletion=completion.scenarios_or_trajectories,
         ),
     ],
@@ -96,7 +108,7 @@ def show(
     ] = False,
     robot: RobotOption = "",
 ) -> None:
-    """Print a scenario as TOML, complete; also the one that a trajectory file was solved from.
+    """Print a task as TOML, complete; also the one that a trajectory file was solved from.
 
     With --torques it prints what the motion of a trajectory file asks of its joints instead, by inverse dynamics.
 
@@ -106,10 +118,15 @@ def show(
         _show_torques(Path(name), robot)
         return
     trajectory = Trajectory.load(name) if name.endswith(".npz") else None
-    scenario = chosen(name, None) if trajectory is None else stored(trajectory)
+    if trajectory is None:
+        asked = chosen(name, settings, robot=robot)
+        whose = robot if robot in bundled_robots() or not robot else str(Path(robot).absolute())
+        print_toml(to_toml(replace(asked, robot=whose or asked.robot)))
+        return
+    scenario = stored(trajectory)
     if scenario is None:
         raise ScenarioError(f"'{name}' keeps no scenario")
-    if trajectory is not None and (unusual := trajectory.unusual_formulation()):
+    if unusual := trajectory.unusual_formulation():
         out.print(f"# the problem had {unusual}; a scenario does not hold these", soft_wrap=True)
     print_toml(to_toml(change(scenario, settings or ())))
 
@@ -145,9 +162,9 @@ def doctor(
     Example: multimodal-to doctor take-off --set knots=20
     """
     if not name.endswith(".toml"):
-        find(name)  # a name that does not exist is no task
+        refuse_unknown(name)
     try:
-        scenario = chosen(name, settings)
+        scenario = chosen(name, settings, robot=robot)
     except ScenarioError as error:  # there is no scenario to look at
         the_robot, diagnosis = load_robot(robot or DEFAULT_ROBOT), refusal("scenario", error)
     else:
@@ -216,7 +233,7 @@ def solve(
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Write no plot and no replay page.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Solve a scenario; write the trajectory, its plot and its replay page.
+    """Solve a task; write the trajectory, its plot and its replay page.
 
     The doctor looks at it first: a hopeless task is refused with exit status 2, and nothing is written. Ctrl-C ends the
     solve with its best iterate, twice at once.

@@ -61,7 +61,7 @@ def given(
             raise InputError("nothing to solve; expected the NAME of a scenario, or --resume FILE")
         start = None if warm_start is None else _motion(warm_start, robot)
         formulation = Formulation.paper() if paper else Formulation.executable()
-        asked = chosen(name, settings, paper=paper)
+        asked = chosen(name, settings, robot=robot, paper=paper)
         whose = robot_for(asked, robot, file="" if quiet else name)
         return Task(scenario=asked, robot=whose, formulation=formulation, start=start)
     if warm_start is not None:

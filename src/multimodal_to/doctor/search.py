@@ -61,7 +61,7 @@ def search(
     problem = {
         "x": variables,
         "f": objective(knot),
-        "g": cs.vertcat(*(some.expression / some.scale for some in asked)),
+        "g": cs.vertcat(*(some.expression / cs.DM(some.scale) for some in asked)),
     }
     options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-6}}
     solver = cs.nlpsol("search", "ipopt", problem, options)
@@ -71,8 +71,8 @@ def search(
         x0=np.concatenate([there, start.joint_positions, share]),
         lbx=np.concatenate([np.full(3, -np.inf), limits.lower, np.zeros(share.size)]),
         ubx=np.concatenate([np.full(3, np.inf), limits.upper, thrusts]),
-        lbg=np.concatenate([np.full(some.expression.shape[0], some.lower / some.scale) for some in asked]),
-        ubg=np.concatenate([np.full(some.expression.shape[0], some.upper / some.scale) for some in asked]),
+        lbg=np.concatenate([some.lower / some.scale for some in asked]),
+        ubg=np.concatenate([some.upper / some.scale for some in asked]),
     )
     if not solver.stats()["success"]:
         return None

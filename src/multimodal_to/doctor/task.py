@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.doctor.turbines import greatest_held
 from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.state import State
 from multimodal_to.models.terrain import FlatGround, Plane
+from multimodal_to.models.turbines import greatest_held
 from multimodal_to.ocp import given, paper, rebinding
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.guess import standing_posture

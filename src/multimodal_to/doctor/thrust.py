@@ -8,8 +8,8 @@ import numpy as np
 
 from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
 from multimodal_to.doctor.task import Task
-from multimodal_to.doctor.turbines import greatest_held, spool_up
 from multimodal_to.errors import ScenarioError
+from multimodal_to.models.turbines import greatest_held, spool_up
 from multimodal_to.scenarios.failures import failing_knots
 
 _HURRY = 0.8

@@ -11,6 +11,7 @@ from multimodal_to.auditing import check_allowances
 from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
 from multimodal_to.doctor.task import Task
 from multimodal_to.errors import FormulationError, InputError, ModelError
+from multimodal_to.models.units import size_of
 from multimodal_to.solving.ipopt import Ipopt
 from multimodal_to.trajectory import QUANTITIES
 
@@ -99,16 +100,17 @@ def _sizes(task: Task) -> dict[str, float]:
     sizes = {}
     for term in task.formulation.costs:
         if term.exists(parameters):
-            heaviest = float(np.max(term.weights(parameters), initial=0.0))
+            of_rows = np.array([size_of(term.scale, unit, task.robot.units) for unit in term.units(parameters)])
+            heaviest = float(np.max(term.weights(parameters) * of_rows**2, initial=0.0))
             if heaviest:
-                sizes[term.name] = heaviest * term.scale**2
+                sizes[term.name] = heaviest
     return sizes
 
 
 def scales(task: Task) -> Iterator[Symptom]:
     """Compare what the robot's variables will be with the sizes that the solver takes for one."""
     robot, scenario = task.robot, task.scenario
-    known = {variable.name: variable.scale for variable in task.formulation.variables}
+    known = {variable.name: max(variable.scales(robot), default=1.0) for variable in task.formulation.variables}
     expected = {"com_position": float(np.abs([scenario.start_com, scenario.end_com]).max())}
     if robot.contacts:
         expected = {"contact_forces": robot.weight / len(robot.contacts), **expected}
@@ -121,7 +123,7 @@ def scales(task: Task) -> Iterator[Symptom]:
         )
     interval = scenario.interval_max
     change = f"replace(Formulation.executable(), interval_scale={interval:.1g})"
-    yield from _off("interval", interval, task.formulation.interval_scale, "s", change)
+    yield from _off("interval", interval, size_of(task.formulation.interval_scale, "s", robot.units), "s", change)
 
 
 def _off(name: str, size: float, scale: float, unit: str, change: str) -> Iterator[Symptom]:

@@ -52,7 +52,7 @@ def normal_force(surface: Surface, point: SX, force: SX) -> SX:
     return cs.dot(surface.normal(point), force)
 
 
-def friction_pyramid(surface: Surface, point: SX, force: SX, friction: float) -> SX:
+def friction_pyramid(surface: Surface, point: SX, force: SX, friction: float, force_size: float) -> SX:
     """Return the four distances to the faces of the pyramid [N], (4, 1), none negative inside: μ n·f ∓ t·f (eq. 12).
 
     All of them together also make the normal force non-negative.
@@ -62,18 +62,15 @@ def friction_pyramid(surface: Surface, point: SX, force: SX, friction: float) ->
         point: where the force acts [m], (3, 1), world.
         force: on the robot [N], (3, 1), world.
         friction: μ [1].
+        force_size: of a contact force [N]; the pyramid does not need it.
     """
     along = surface.tangents(point).T @ force
     reach = friction * normal_force(surface, point, force)
     return cs.vertcat(reach - along, reach + along)
 
 
-CONE_FORCE = 50.0
-"""What the row of the second-order cone is divided by, so that it is in N and of the size of a contact force [N]."""
-
-
-def friction_cone(surface: Surface, point: SX, force: SX, friction: float) -> SX:
-    """Return n·f and ((μ n·f)² − ‖t·f‖²) / `CONE_FORCE` [N], (2, 1), none negative inside the second-order cone.
+def friction_cone(surface: Surface, point: SX, force: SX, friction: float, force_size: float) -> SX:
+    """Return n·f and ((μ n·f)² − ‖t·f‖²) / F [N], (2, 1), none negative inside the second-order cone.
 
     Polynomial in the force, so smooth at f = 0 as well, where the norm itself is not; the first row chooses between the
     two cones of the second.
@@ -83,9 +80,10 @@ def friction_cone(surface: Surface, point: SX, force: SX, friction: float) -> SX
         point: where the force acts [m], (3, 1), world.
         force: on the robot [N], (3, 1), world.
         friction: μ [1].
+        force_size: F, the size of a contact force [N], so that the row of squares is in N and of that size.
     """
     along, normal = surface.tangents(point).T @ force, normal_force(surface, point, force)
-    return cs.vertcat(normal, ((friction * normal) ** 2 - cs.sumsqr(along)) / CONE_FORCE)
+    return cs.vertcat(normal, ((friction * normal) ** 2 - cs.sumsqr(along)) / force_size)
 
 
 FRICTION = {FrictionCone.PYRAMID: friction_pyramid, FrictionCone.SECOND_ORDER: friction_cone}

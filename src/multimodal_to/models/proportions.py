@@ -70,14 +70,14 @@ def contact_reach(contacts: Array, height: float) -> Array:
     return np.array([along, along, down]) + BEYOND_HOME * height
 
 
-def jet_reach(jets: Array, height: float) -> Array:
-    """Return the default reach of jets by world axis [m], (3,): as at home, and `BEYOND_HOME` of L more.
+def turned_reach(places: Array, height: float) -> Array:
+    """Return the default reach of what turns with the robot [m], (3,): as at home, and `BEYOND_HOME` of L more.
 
     All axes are alike, since the robot may turn in the air.
 
     Args:
-        jets: offsets of the frames of the jets [m], (jets, 3).
+        places: offsets of jets, or of contact points that no joint moves [m], (places, 3).
         height: L [m].
     """
-    away = float(np.linalg.norm(jets, axis=1).max(initial=0.0))
+    away = float(np.linalg.norm(places, axis=1).max(initial=0.0))
     return np.full(3, away + BEYOND_HOME * height)

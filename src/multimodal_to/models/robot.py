@@ -30,6 +30,7 @@ from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.jet import ENGINES, Jet
 from multimodal_to.models.proportions import Gait
 from multimodal_to.models.robot_keys import UNIONS, JetTable, JointTable, RobotFile
+from multimodal_to.models.units import EARTH, Units
 from multimodal_to.values import FrozenMapping, Value
 
 ROBOT_FILE = "robot.toml"
@@ -177,6 +178,17 @@ class Robot(Value):
         contacts = _offsets(self.kindyn, self.home, self.contact_names)
         jets = _offsets(self.kindyn, self.home, [jet.frame for jet in self.jets])
         return proportions.standing_height(contacts, jets)
+
+    @cached_property
+    def units(self) -> Units:
+        """Return the robot's own units: m, L and g, and how many contact points share the weight."""
+        strength = float(np.linalg.norm(self.gravity))
+        return Units(
+            mass=self.mass,
+            length=self.standing_height,
+            gravity=strength or EARTH,
+            contact_points=max(len(self.contacts), 1),
+        )
 
     @cached_property
     def home_com(self) -> tuple[float, float, float]:
@@ -593,10 +605,21 @@ def _proportions(file: RobotFile, kindyn: KinDynComputations, home: Posture) -> 
     contacts, jets = _from_com(file, kindyn, home)
     height = proportions.standing_height(contacts, jets)
     return (
-        proportions.contact_reach(contacts, height) if reach.contacts is None else np.array(reach.contacts),
-        proportions.jet_reach(jets, height) if reach.jets is None else np.array(reach.jets),
+        _contact_reach(file, contacts, height) if reach.contacts is None else np.array(reach.contacts),
+        proportions.turned_reach(jets, height) if reach.jets is None else np.array(reach.jets),
         Gait(lift=proportions.LIFT * height if gait.lift is None else gait.lift, swing=gait.swing),
     )
+
+
+def _contact_reach(file: RobotFile, contacts: Array, height: float) -> Array:
+    """Return the default reach of contact points [m], (3,); those that no joint moves tilt with the body, as jets do.
+
+    Args:
+        file: with its joints.
+        contacts: offsets of the contact points [m], (contacts, 3).
+        height: L [m].
+    """
+    return (proportions.contact_reach if file.joints else proportions.turned_reach)(contacts, height)
 
 
 def _offsets(kindyn: KinDynComputations, posture: Posture, frames: Sequence[str]) -> Array:

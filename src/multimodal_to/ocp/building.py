@@ -16,6 +16,7 @@ from multimodal_to.arguments import checked
 from multimodal_to.errors import FormulationError, listed
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
+from multimodal_to.models.units import size_of
 from multimodal_to.ocp import given, rebinding
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.outline import formulate, prepared
@@ -55,7 +56,7 @@ def build(
     layout = outline.layout
     stages = tuple(named.stage for named in outline.stages)
 
-    scale = np.append(np.tile(layout.scale, scenario.knots + 1), formulation.interval_scale)
+    scale = np.append(np.tile(layout.scale, scenario.knots + 1), size_of(formulation.interval_scale, "s", robot.units))
     lower, upper = rebinding.stacked(outline.bounds, layout, scenario, scale)
     box_lower, box_upper = rebinding.stacked(outline.box, layout, scenario, scale)
     row_lower, row_upper, rows = _row_bounds(outline.stages)
@@ -115,7 +116,7 @@ def _row_bounds(stages: Sequence[NamedStage]) -> tuple[Array, Array, dict[str, R
                 knots=np.tile(named.knots, count),
                 components=np.repeat(np.array(rows.components, dtype=np.str_), repeats),
                 units=np.repeat(np.array(rows.units, dtype=np.str_), repeats),
-                scale=np.full(count * repeats, rows.scale),
+                scale=np.repeat(rows.scale, repeats),
             )
             sets[name] = sets[name].joined(here_too) if name in sets else here_too
             offset += count

@@ -15,10 +15,16 @@ from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import SX
 from multimodal_to.models import attitude, contact
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.units import OwnSize
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.scenarios.keyframes import attitude_at
+
+LOAD = OwnSize(50.0, of_a_point=True)
+"""Size of the force of a contact point that the solver takes for one [N], and of its rate [N/s]."""
+FORCE = OwnSize(50.0)
+"""Size of a force, and of a moment and of rates of thrust, that the solver takes for one [N, N m, N/s or N/s²]."""
 
 # -------------------------------------------------------------------- at a knot
 
@@ -67,8 +73,9 @@ def contact_forces(knot: Knot, parameters: Parameters) -> SX:
 def friction_cone(knot: Knot, parameters: Parameters) -> SX:
     """|t·f| ≤ μ n·f as the scenario's pyramid or cone, which holds n·f ≥ 0 as well (eq. 12, 18, 19)."""
     inside = contact.FRICTION[parameters.scenario.friction_cone]
+    size = LOAD.of("N", parameters.robot.units)
     faces = [
-        inside(parameters.surface, point, force, parameters.friction)
+        inside(parameters.surface, point, force, parameters.friction, size)
         for point, force in zip(knot.points, knot.forces, strict=True)
     ]
     return cs.vertcat(*faces)

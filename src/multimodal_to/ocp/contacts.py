@@ -11,6 +11,7 @@ import numpy as np
 from multimodal_to.adam.spatial import SX
 from multimodal_to.models.contact import FACES
 from multimodal_to.models.sole import soles
+from multimodal_to.models.units import Sized
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
@@ -19,8 +20,8 @@ from multimodal_to.ocp.schedule import Flags
 from multimodal_to.ocp.terms import Constraint, Where, at_least, each, equal
 from multimodal_to.trajectory.quantities import XYZ
 
-ON_GROUND = 1e-5
-"""Largest height of a contact point that stands [m]: a sole has more corners than a plane needs."""
+ON_GROUND = Sized(1e-5, "m")
+"""Largest height of a contact point that stands: a sole has more corners than a plane needs."""
 _LINE = 1e-3
 """Points nearer to a line than this share of its length do not hold a body from turning about it [1]."""
 
@@ -216,7 +217,7 @@ GIVEN_OFF = Constraint(
     within=equal(),
     unit="N",
     holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
-    scale=50.0,
+    scale=constraints.LOAD,
     labels=each("contact", *XYZ),
     when=_gives,
     present=_unloaded,
@@ -224,7 +225,9 @@ GIVEN_OFF = Constraint(
 GIVEN_ON = Constraint(
     name="given_on",
     value=constraints.heights,
-    within=equal(0.5 * ON_GROUND),  # so that the other corners of a sole are in the middle of their range
+    within=equal(
+        Sized(0.5 * ON_GROUND.value, "m")
+    ),  # so that the other corners of a sole are in the middle of their range
     unit="m",
     labels=each("contact"),
     when=_gives,

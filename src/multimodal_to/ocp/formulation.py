@@ -10,6 +10,7 @@ from functools import cached_property
 
 from multimodal_to.arguments import check, check_fields, checked
 from multimodal_to.errors import FormulationError, listed, shown, unknown
+from multimodal_to.models.units import OwnSize
 from multimodal_to.ocp import margins, paper
 from multimodal_to.ocp.integration import BACKWARD_EULER, LEAPFROG, IntegrationRule
 from multimodal_to.ocp.knot import VARIABLE_NAMES
@@ -29,7 +30,7 @@ class Formulation:
     variables: tuple[Variable, ...] = VARIABLES
     rule: IntegrationRule = BACKWARD_EULER
     terms: tuple[Term, ...]
-    interval_scale: float = INTERVAL_SCALE  # the size of Δt that the solver sees as one [s]
+    interval_scale: float | OwnSize = INTERVAL_SCALE  # the size of Δt that the solver sees as one [s]
 
     def __post_init__(self) -> None:
         check_fields(self, FormulationError, but=("terms",))
@@ -47,8 +48,9 @@ class Formulation:
             raise FormulationError(f"the formulation lacks the variables {listed(missing)}")
         if extra := [variable.name for variable in self.variables if variable.name not in VARIABLE_NAMES]:
             raise FormulationError(f"{listed(extra)} cannot be variables; expected {listed(VARIABLE_NAMES)}")
-        if not 0 < self.interval_scale < math.inf:
-            raise FormulationError(f"interval_scale is {self.interval_scale}; expected a positive number [s]")
+        interval = self.interval_scale.value if isinstance(self.interval_scale, OwnSize) else self.interval_scale
+        if not 0 < interval < math.inf:
+            raise FormulationError(f"interval_scale is {interval}; expected a positive number [s]")
 
     @classmethod
     def paper(cls) -> Formulation:

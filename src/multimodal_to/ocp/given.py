@@ -14,17 +14,16 @@ from multimodal_to.models.attitude import signed_like
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.models.terrain import heights_below
-from multimodal_to.ocp.guess import contact_positions
+from multimodal_to.models.units import Sized
+from multimodal_to.ocp.guess import IN_THE_AIR, contact_positions
 from multimodal_to.ocp.variables import Bounds
 from multimodal_to.scenarios.scenario import Scenario, Start, word
 from multimodal_to.trajectory import Trajectory, rules
 from multimodal_to.trajectory.states import state_at
 from multimodal_to.values import FrozenMapping
 
-NO_FORCE = 0.01
-"""Largest contact force component left at a knot that has to be free of contact [N]."""
-_IN_THE_AIR = 1e-3
-"""A contact point of the given state that is higher than this bears no force at the first knot [m]."""
+NO_FORCE = Sized(0.01, "N", of_a_point=True)
+"""Largest contact force component left at a knot that has to be free of contact."""
 
 
 def check(robot: Robot, scenario: Scenario, initial: State | None) -> None:
@@ -127,8 +126,9 @@ def set_start(bounds: Bounds, robot: Robot, scenario: Scenario, initial: State, 
         bounds.upper[name][:, 0] = np.inf if between else value
     places = points.reshape(-1, 3).T
     heights = places[2] - heights_below(scenario.surface, places)
-    least = 0.5 * scenario.contact_bounds(robot)[0] / np.maximum(heights, _IN_THE_AIR)
-    above, left = np.repeat(heights > _IN_THE_AIR, 3), np.repeat(np.minimum(NO_FORCE, least), 3)
+    in_the_air = IN_THE_AIR.of(robot.units)
+    least = 0.5 * scenario.contact_bounds(robot)[0] / np.maximum(heights, in_the_air)
+    above, left = np.repeat(heights > in_the_air, 3), np.repeat(np.minimum(NO_FORCE.of(robot.units), least), 3)
     lower, upper = (side["contact_forces"] for side in (bounds.lower, bounds.upper))
     lower[above, 0], upper[above, 0] = (
         np.maximum(lower[above, 0], -left[above]),

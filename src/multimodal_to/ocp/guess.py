@@ -15,16 +15,17 @@ from multimodal_to.errors import ScenarioError
 from multimodal_to.models.attitude import signed_like
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Surface, heights_below
+from multimodal_to.models.units import ONE, Sized
 from multimodal_to.ocp import waypoints
 from multimodal_to.ocp.flights import flights, interval, thrown
-from multimodal_to.ocp.gait import footfalls, steps
+from multimodal_to.ocp.gait import GROUNDED, footfalls, steps
 from multimodal_to.ocp.schedule import Schedule
 from multimodal_to.ocp.variables import Layout
 from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 
-_CONTACT_TOLERANCE = 1e-6
-"""A sole counts as on the ground below this height [m]: more corners than a plane needs make it overdetermined."""
+_CONTACT_TOLERANCE = Sized(1e-6, "m")
+"""A sole counts as on the ground below this height: more corners than a plane needs make it overdetermined."""
 PLACES_WEIGHT = 30.0
 """How much feet that are elsewhere than at home count, in squares of L, beside squares of joints' ways [rad²]."""
 _TILT_MAX = 0.6
@@ -32,8 +33,8 @@ _TILT_MAX = 0.6
 
 _ALONG_GROUND = np.array([[1.0], [1.0], [0.0]])
 """What takes the vertical part from positions side by side [1], (3, 1)."""
-IN_THE_AIR = 1e-3
-"""A contact point that is higher than this bears no force [m]."""
+IN_THE_AIR = Sized(1e-3, "m")
+"""A contact point that is higher than this bears no force."""
 LANDED = 0.3
 """Share of the horizon in which a motion from the air to the ground comes down [1]."""
 
@@ -72,7 +73,9 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
     the feet's places may lead it astray; where they do, it starts again from a posture that leaves them out.
     """
     tree, home, limits, count = robot.kindyn.tree, robot.home, robot.joint_limits, len(robot.joint_names)
-    position, tilt, joints = cs.SX.sym("p", 3), cs.SX.sym("tilt", 3), cs.SX.sym("s", count)
+    length = ONE.of("m", robot.units)  # what the solver takes for one
+    scaled_position, tilt, joints = cs.SX.sym("p", 3), cs.SX.sym("tilt", 3), cs.SX.sym("s", count)
+    position = length * scaled_position
     weight = cs.SX.sym("weight")
     orientation = quaternion.product(quaternion.exp(tilt), cs.DM(home.base_quaternion_xyzw))
     base = Pose(quaternion.rotation_matrix(orientation), position)
@@ -84,10 +87,10 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
         *((point - com - place)[:2] / robot.standing_height for point, place in zip(points, places, strict=True))
     )
     problem = {
-        "x": cs.vertcat(position, tilt, joints),
+        "x": cs.vertcat(scaled_position, tilt, joints),
         "p": weight,
         "f": cs.sumsqr(joints - home.joint_positions) + cs.sumsqr(tilt) + weight * cs.sumsqr(moved),
-        "g": cs.vertcat(centroidal.com_position(tree, base, joints), *heights),
+        "g": cs.vertcat(centroidal.com_position(tree, base, joints), *heights) / length,
     }
     options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}}
     solver = cs.nlpsol("standing_posture", "ipopt", problem, options)
@@ -98,12 +101,12 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
             p=places_weight,
             lbx=np.concatenate([np.full(3, -np.inf), np.full(3, -tilt_max), limits.lower]),
             ubx=np.concatenate([np.full(3, np.inf), np.full(3, tilt_max), limits.upper]),
-            lbg=np.concatenate([com, np.zeros(len(heights))]),
-            ubg=np.concatenate([com, np.full(len(heights), _CONTACT_TOLERANCE)]),
+            lbg=np.concatenate([com, np.zeros(len(heights))]) / length,
+            ubg=np.concatenate([com, np.full(len(heights), _CONTACT_TOLERANCE.of(robot.units))]) / length,
         )
         return np.array(result["x"]).ravel() if solver.stats()["success"] else None
 
-    lifted = np.concatenate([home.base_position + com - at_home, np.zeros(3), home.joint_positions])
+    lifted = np.concatenate([(home.base_position + com - at_home) / length, np.zeros(3), home.joint_positions])
     values = searched(lifted, PLACES_WEIGHT)
     if values is None:
         values = searched(lifted, 0.0)
@@ -113,7 +116,7 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
         values = values if nearer is None else nearer
     turned = cs.Function("turned", [tilt], [orientation])(values[3:6])
     return Posture(
-        base_position=values[:3],
+        base_position=length * values[:3],
         base_quaternion_xyzw=np.array(turned).ravel(),
         joint_positions=np.clip(values[6:], limits.lower, limits.upper),
     )
@@ -148,7 +151,7 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     knots = scenario.knots + 1
     start = np.array(scenario.start_com)
     schedule = Schedule.of(robot, scenario)
-    travelled = _travelled(scenario, schedule)
+    travelled = _travelled(robot, scenario, schedule)
     guess = np.zeros((layout.size, knots))
     view = layout.read(guess)
     view["com_position"][:] = start[:, None] + travelled
@@ -175,7 +178,7 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
     stands = contact_positions(robot, standing).reshape(-1, 3, 1)
     points = stands + moved
     points[:, 2] += _ground(scenario, points) - _ground(scenario, stands)
-    if scenario.start is not Start.STANDING:
+    if scenario.start is not Start.STANDING or _lifts_off_whole(robot, scenario):
         points[:, 2] = np.maximum(points[:, 2], (stands + away)[:, 2])  # the feet fly along
     along = np.gradient(travelled, interval(scenario), axis=1) * (rise > 0.0)
     for name in ("com_position", "base_position"):
@@ -185,7 +188,7 @@ def start_guess(robot: Robot, scenario: Scenario, standing: Posture, layout: Lay
         view[name][2] += speed
     if scenario.keyframes:
         points = waypoints.pose(robot, scenario, view, points)
-        shares = shares * (points[:, 2] - _ground(scenario, points) < IN_THE_AIR)
+        shares = shares * (points[:, 2] - _ground(scenario, points) < IN_THE_AIR.of(robot.units))
     view["contact_positions"][:] = points.reshape(-1, knots)
     view["contact_forces"][2::3] = robot.weight * (1.0 - flown) * shares
     return guess
@@ -196,23 +199,33 @@ def _lands(scenario: Scenario) -> bool:
     return scenario.start is not Start.STANDING and scenario.terminal is Terminal.STANDING
 
 
-def _travelled(scenario: Scenario, schedule: Schedule) -> Array:
+def _travelled(robot: Robot, scenario: Scenario, schedule: Schedule) -> Array:
     """Return how far the CoM is from its start at every knot [m], (3, N + 1), by way of the keyframes."""
     start = np.array(scenario.start_com)
     if not scenario.keyframes_between():
-        return np.asarray((np.array(scenario.end_com) - start)[:, None] * _progress(scenario, schedule))
+        return np.asarray((np.array(scenario.end_com) - start)[:, None] * _progress(robot, scenario, schedule))
     return np.asarray(waypoints.com(scenario, early=LANDED if _lands(scenario) else 1.0) - start[:, None])
 
 
-def _progress(scenario: Scenario, schedule: Schedule) -> Array:
+def _progress(robot: Robot, scenario: Scenario, schedule: Schedule) -> Array:
     """Return which share of the way is behind the robot at every knot, (N + 1,); one that lands is there early.
 
+    A robot that lifts off whole stays where it is until its thrusts carry it, after `GROUNDED` of the horizon.
     Where contacts are given, the robot goes on while a point of it is off.
     """
     share = np.linspace(0.0, 1.0, scenario.knots + 1)
     if (off := schedule.off.any(axis=0)).any():
         return np.asarray(np.cumsum(off) / off.sum())
+    if _lifts_off_whole(robot, scenario):
+        return np.maximum(share - GROUNDED, 0.0) / (1.0 - GROUNDED)
     return np.minimum(share / LANDED, 1.0) if _lands(scenario) else share
+
+
+def _lifts_off_whole(robot: Robot, scenario: Scenario) -> bool:
+    """Return whether a motion leaves the ground for the air with feet that no joint moves, so that they go along."""
+    if not robot.contacts or scenario.start is not Start.STANDING or scenario.terminal is not Terminal.HOVER:
+        return False
+    return all(robot.kindyn.tree.frame(name).body == 0 for name in robot.contact_names)
 
 
 def _weight_flown(robot: Robot, scenario: Scenario, schedule: Schedule) -> Array:
@@ -224,15 +237,17 @@ def _weight_flown(robot: Robot, scenario: Scenario, schedule: Schedule) -> Array
     """
     if not robot.jets:
         return np.zeros(scenario.knots + 1)
-    return np.where(schedule.in_air, 1.0, _usually_flown(scenario))
+    return np.where(schedule.in_air, 1.0, _usually_flown(robot, scenario))
 
 
-def _usually_flown(scenario: Scenario) -> Array:
+def _usually_flown(robot: Robot, scenario: Scenario) -> Array:
     share = np.linspace(0.0, 1.0, scenario.knots + 1)
     if any(one.keyframe.hover or one.keyframe.standing for one in scenario.keyframes_between()):
         return waypoints.flown(scenario)
     if scenario.start is not Start.STANDING:
         return np.minimum((1.0 - share) / (1.0 - LANDED), 1.0) if _lands(scenario) else np.ones_like(share)
+    if _lifts_off_whole(robot, scenario):
+        return np.minimum(share / GROUNDED, 1.0)
     return share if scenario.terminal is Terminal.HOVER and scenario.guess_steps else np.zeros_like(share)
 
 

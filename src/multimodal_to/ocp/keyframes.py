@@ -81,7 +81,7 @@ def _set_start(bounds: Bounds, robot: Robot, scenario: Scenario, standing: Postu
     for name in (*_AT_REST, "com_velocity", "angular_momentum", "thrust_rate"):
         fix(name, 0, 0.0)
     if scenario.start is Start.HOVER:
-        fix("contact_forces", 0, 0.0, within=given.NO_FORCE)
+        fix("contact_forces", 0, 0.0, within=given.NO_FORCE.of(robot.units))
         return
     fix("base_position", 0, standing.base_position)
     fix("base_quaternion_xyzw", 0, signed_like(standing.base_quaternion_xyzw, robot.upright.base_quaternion_xyzw))
@@ -121,7 +121,7 @@ def _still(bounds: Bounds, robot: Robot, scenario: Scenario, one: Placed, rule: 
             fix("thrust_rate", at, 0.0, rows=running)  # one that has failed is still running down
         # Where velocities are between knots, the forces of the knot before the last one make the last velocity.
         for at in (neighbour, knot) if between_knots and last else (knot,):
-            fix("contact_forces", at, 0.0, within=given.NO_FORCE)
+            fix("contact_forces", at, 0.0, within=given.NO_FORCE.of(robot.units))
 
 
 # -------------------------------------------------------------------- terms

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.contact import FACES
+from multimodal_to.models.units import ONE, ONE_OF_A_POINT, OwnSize
 from multimodal_to.ocp import constraints, contacts, costs, failures, pushes, regions
 from multimodal_to.ocp.contacts import ON_GROUND
 from multimodal_to.ocp.parameters import Parameters
@@ -37,9 +38,6 @@ from multimodal_to.trajectory.quantities import TWIST, XYZ, XYZW, row_labels
 
 UPRIGHT = 1e-3
 """How far each part of the base's quaternion, from upright, may be off in a hover [1]: 2e-3 rad about each axis."""
-
-FORCE = 50.0
-"""Size of a force that the solver takes for one [N]."""
 
 
 def _lagging_jets(parameters: Parameters) -> tuple[str, ...]:
@@ -173,7 +171,7 @@ FRICTION_CONE = Constraint(
     within=at_least(0.0),
     unit="N",
     holds=(Where.FIRST_KNOT, Where.LATER_KNOTS),
-    scale=FORCE,
+    scale=constraints.LOAD,
     labels=_faces,
     present=contacts.loaded_faces,
 )
@@ -182,6 +180,7 @@ COMPLEMENTARITY = Constraint(
     within=at_most(_complementarity_max),
     unit="N m",
     holds=Where.LATER_KNOTS,
+    scale=ONE_OF_A_POINT,
     labels=each("contact"),
     present=contacts.found_at_knot,
 )
@@ -204,7 +203,7 @@ STATIC_EQUILIBRIUM = Constraint(
     within=equal(),
     unit=("N", "N", "N", "N m", "N m", "N m"),
     holds=Where.FIRST_KNOT,
-    scale=FORCE,
+    scale=constraints.FORCE,
     labels=TWIST,
     when=_starts_at_rest,
 )
@@ -213,7 +212,7 @@ STEADY_THRUST = Constraint(
     within=equal(),
     unit=EngineUnits("N", "N/s", "N/s²"),
     holds=Where.FIRST_KNOT,
-    scale=FORCE,
+    scale=constraints.FORCE,
     labels=each("jet"),
     when=_hovers_first,
 )
@@ -259,7 +258,7 @@ THRUST_INTEGRATION = Constraint(
     within=equal(),
     unit="N",
     holds=Where.EVERY_INTERVAL,
-    scale=FORCE,
+    scale=constraints.FORCE,
     labels=each("jet"),
 )
 THRUST_DYNAMICS = Constraint(
@@ -267,7 +266,7 @@ THRUST_DYNAMICS = Constraint(
     within=equal(),
     unit=EngineUnits("N", "N/s", "N/s"),
     holds=Where.EVERY_INTERVAL,
-    scale=FORCE,
+    scale=constraints.FORCE,
     labels=each("jet"),
 )
 SLIDING = Constraint(
@@ -275,6 +274,7 @@ SLIDING = Constraint(
     within=between(_sliding_min, _sliding_max),
     unit="N m",
     holds=Where.EVERY_INTERVAL,
+    scale=ONE_OF_A_POINT,
     labels=each("contact", "x", "y"),
     present=contacts.slides_before,
 )
@@ -295,6 +295,7 @@ COMPLEMENTARITY_BEFORE = Constraint(
     within=at_most(_complementarity_max),
     unit="N m",
     holds=Where.EVERY_INTERVAL,
+    scale=ONE_OF_A_POINT,
     labels=each("contact"),
     present=contacts.found_before,
 )
@@ -311,7 +312,7 @@ FINAL_EQUILIBRIUM = Constraint(
     within=equal(),
     unit=("N", "N", "N", "N m", "N m", "N m"),
     holds=Where.LAST_KNOT,
-    scale=FORCE,
+    scale=constraints.FORCE,
     labels=TWIST,
     when=_stands_last,
 )
@@ -321,7 +322,7 @@ FINAL_STEADY_THRUST = Constraint(
     within=equal(),
     unit=EngineUnits("N", "N/s", "N/s²", lagging=True),
     holds=Where.LAST_KNOT,
-    scale=FORCE,
+    scale=constraints.FORCE,
     labels=_lagging_jets,
     when=_hovers_last,
     present=_running_lagging_jets,
@@ -355,7 +356,7 @@ THRUST_RATE_AT_START = Constraint(
     within=equal(),
     unit="N/s",
     holds=Where.FIRST_INTERVAL,
-    scale=FORCE,
+    scale=constraints.FORCE,
     labels=each("jet"),
     when=_starts_given,
 )
@@ -410,7 +411,7 @@ def running(
     residual: KnotFunction | IntervalFunction,
     unit: Units,
     *charged: Where,
-    scale: float = 1.0,
+    scale: float | OwnSize = ONE,
 ) -> Cost:
     """Return a cost that is charged per second, with the scenario's weight of the residual's name.
 
@@ -441,10 +442,10 @@ COSTS = (
     running(costs.joint_velocities, JointUnits("rad/s")),
     running(costs.posture, JointUnits("rad")),
     running(costs.base_orientation, "1"),
-    running(costs.contact_forces, "N", Where.FIRST_KNOT, Where.LATER_KNOTS, scale=50.0),
-    running(costs.contact_force_rates, "N/s", Where.EVERY_INTERVAL, scale=50.0),
-    running(costs.thrust, "N", scale=100.0),
-    running(costs.thrust_rate, "N/s", scale=50.0),
+    running(costs.contact_forces, "N", Where.FIRST_KNOT, Where.LATER_KNOTS, scale=constraints.LOAD),
+    running(costs.contact_force_rates, "N/s", Where.EVERY_INTERVAL, scale=constraints.LOAD),
+    running(costs.thrust, "N", scale=OwnSize(100.0)),
+    running(costs.thrust_rate, "N/s", scale=constraints.FORCE),
     running(costs.throttle, "%", scale=50.0),
     _once("initial_posture", costs.posture, JointUnits("rad"), Where.FIRST_KNOT),
     _once("final_posture", costs.posture, JointUnits("rad")),

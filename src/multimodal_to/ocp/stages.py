@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import SX
 from multimodal_to.errors import FormulationError
+from multimodal_to.models.units import size_of
 from multimodal_to.ocp.formulation import Formulation
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
@@ -93,7 +94,7 @@ def collect(
     z, z_next, dt = cs.SX.sym("z", layout.size), cs.SX.sym("z_next", layout.size), cs.SX.sym("dt")
     lifted = Lifted()
     start, end = (Knot(parameters.robot, **layout.read(values * layout.scale), lift=lifted) for values in (z, z_next))
-    duration = dt * formulation.interval_scale
+    duration = dt * size_of(formulation.interval_scale, "s", parameters.robot.units)
     interval = Interval(start, end, duration, formulation.rule)
     first, every, last = np.array([0]), np.arange(knots), np.array([knots - 1])
     found = parameters.scenario.start is Start.HOVER  # the first knot's posture is found
@@ -149,7 +150,7 @@ def collect(
                         start=z,
                         end=z_next,
                         interval=dt,
-                        lifted_families=tuple(some.expression / some.scale for _, some in rows),
+                        lifted_families=tuple(some.expression / cs.DM(some.scale) for _, some in rows),
                         lifted_costs=cs.vertcat(cs.SX(0, 1), *costs.values()),
                         lifted=lifted,
                     ),

@@ -21,6 +21,7 @@ from multimodal_to.adam.spatial import SX, Array
 from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import FormulationError, MultimodalError, listed, said, shown
 from multimodal_to.models.joint_units import either, joint_units
+from multimodal_to.models.units import ONE, OwnSize, Sized, size_of, sized
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
@@ -28,8 +29,8 @@ from multimodal_to.trajectory.quantities import row_labels
 
 KnotFunction = Callable[[Knot, Parameters], SX]
 IntervalFunction = Callable[[Interval, Parameters], SX]
-Limit = float | Callable[[Parameters], float]
-"""A number, or a function of the parameters for one that the robot or the scenario says."""
+Limit = float | Sized | Callable[[Parameters], float]
+"""A number, one that grows and shrinks with the robot, or a function of the parameters."""
 Labels = tuple[str, ...] | Callable[[Parameters], tuple[str, ...]]
 """The names of a term's rows, or a function of the parameters where the robot says how many there are."""
 
@@ -198,7 +199,10 @@ class Within:
 
     def limits(self, parameters: Parameters) -> tuple[float, float]:
         """Return the two numbers."""
-        lower, upper = (limit(parameters) if callable(limit) else limit for limit in (self.lower, self.upper))
+        units = parameters.robot.units
+        lower, upper = (
+            limit(parameters) if callable(limit) else sized(limit, units) for limit in (self.lower, self.upper)
+        )
         return float(lower), float(upper)
 
 
@@ -234,7 +238,7 @@ class Rows:
     lower: float
     upper: float
     units: tuple[str, ...]  # of each row
-    scale: float  # the size that the solver sees as one
+    scale: Array  # of each row: the size that the solver sees as one, (m,)
     components: tuple[str, ...]  # the name of each row among them
     present: NDArray[np.bool_] | None = None  # at which knots each row is, (m, N + 1); None: at all of its place
 
@@ -243,6 +247,7 @@ class Rows:
         return replace(
             self,
             expression=cs.vertcat(cs.SX(0, 1), *(self.expression[index] for index in kept)),
+            scale=self.scale[list(kept)],
             units=tuple(self.units[index] for index in kept),
             components=tuple(self.components[index] for index in kept),
             present=None if self.present is None else self.present[list(kept)],
@@ -259,7 +264,8 @@ class Constraint:
         unit: of the rows, such as `"m"`, `"N m"` or `"1"`; a tuple or a function of the parameters gives each its own.
         name: in every report; by default the function's.
         holds: one place, or several.
-        scale: the size that the solver takes for one [unit].
+        scale: the size that the solver takes for one [unit]: as it is, or an `OwnSize`; by default what for the iRonCub
+            is one SI unit.
         labels: names of the rows, as `("x", "y", "z")`; by default their numbers.
         when: for which problems the constraint exists; by default for all.
         rigid: `relax` does not let the rows give way unless it is told to.
@@ -276,7 +282,7 @@ class Constraint:
     unit: Units
     name: str = ""
     holds: Place | tuple[Place, ...] = Where.EVERY_KNOT
-    scale: float = 1.0
+    scale: float | OwnSize = ONE
     labels: Labels = ()
     when: Callable[[Parameters], bool] | None = None
     rigid: bool = False
@@ -326,7 +332,7 @@ class Constraint:
             lower=lower,
             upper=upper,
             units=units,
-            scale=self.scale,
+            scale=np.array([size_of(self.scale, unit, parameters.robot.units) for unit in units]),
             components=tuple(labels),
             present=None if self.present is None else self._present(count, parameters),
         )
@@ -357,7 +363,7 @@ class Cost:
         name: in every report; by default the function's.
         charged: one place, or several.
         per_second: whether each charge is multiplied by Δt, so that the sum is an integral over time.
-        scale: the size of the residual that `doctor` weighs it by [unit].
+        scale: the size of the residual that `doctor` weighs it by [unit]: as it is, or an `OwnSize`.
         when: for which problems the cost exists; by default for all.
 
     Raises:
@@ -370,7 +376,7 @@ class Cost:
     name: str = ""
     charged: Place | tuple[Place, ...] = Where.LATER_KNOTS
     per_second: bool = True
-    scale: float = 1.0
+    scale: float | OwnSize = ONE
     when: Callable[[Parameters], bool] | None = None
 
     def __post_init__(self) -> None:
@@ -391,6 +397,11 @@ class Cost:
     def exists(self, parameters: Parameters) -> bool:
         """Return whether the problem has the cost, as `when` says."""
         return self.when is None or bool(_asked(self.name, "condition", self.when, parameters))
+
+    def units(self, parameters: Parameters) -> tuple[str, ...]:
+        """Return the unit of each row of the residual, or the one of all."""
+        units = _asked(self.name, "list of units", self.unit, parameters) if callable(self.unit) else self.unit
+        return (units,) if isinstance(units, str) else tuple(units)
 
     def weights(self, parameters: Parameters) -> float | Array:
         """Return the weight: one number, or one for each row of the residual.
@@ -452,7 +463,8 @@ def _complete(term: Constraint | Cost, function: Any, place: str) -> None:
         raise _wrong(name, f"'{place}' is {shown(getattr(term, place))}", "different members of Where, or Knots")
     if len({entry.of_intervals for entry in places}) > 1:
         raise _wrong(name, f"'{place}' names knots and intervals", "only knots, or only intervals")
-    if not (isinstance(term.scale, int | float) and 0 < term.scale < math.inf):
+    size = term.scale.value if isinstance(term.scale, OwnSize) else term.scale
+    if not (isinstance(size, int | float) and 0 < size < math.inf):
         raise _wrong(name, f"the scale is {shown(term.scale)}", "a positive number")
     given = () if callable(term.unit) else (term.unit,) if isinstance(term.unit, str) else term.unit
     for unit in given:

@@ -14,8 +14,9 @@ from multimodal_to.arguments import check_fields
 from multimodal_to.errors import FormulationError, ScenarioError, unknown
 from multimodal_to.models.joint_units import either
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.units import ONE, OwnSize, size_of
 from multimodal_to.scenarios.scenario import Scenario
-from multimodal_to.trajectory import QUANTITIES
+from multimodal_to.trajectory import QUANTITIES, row_units
 from multimodal_to.values import Value
 
 
@@ -23,19 +24,26 @@ from multimodal_to.values import Value
 class Variable:
     """A decision variable of every knot: a quantity of the trajectory, and the size that the solver sees as one.
 
+    An `OwnSize` grows and shrinks with the robot; without one it is what for the iRonCub is one SI unit.
+
     Raises:
         FormulationError: there is no such quantity, or the scale is no positive number.
     """
 
     name: str  # one of `QUANTITIES`, which has its rows and its unit
-    scale: float = 1.0  # [unit of the quantity]
+    scale: float | OwnSize = ONE  # [unit of the quantity]
 
     def __post_init__(self) -> None:
         check_fields(self, FormulationError)
         if self.name not in QUANTITIES:
             raise FormulationError(unknown("variable", self.name, QUANTITIES))
-        if not 0 < self.scale < math.inf:
-            raise FormulationError(f"the scale of '{self.name}' is {self.scale}; expected a positive number")
+        scale = self.scale.value if isinstance(self.scale, OwnSize) else self.scale
+        if not 0 < scale < math.inf:
+            raise FormulationError(f"the scale of '{self.name}' is {scale}; expected a positive number")
+
+    def scales(self, robot: Robot) -> list[float]:
+        """Return the scale of each row of the variable, for a robot [own unit]."""
+        return [size_of(self.scale, unit, robot.units) for unit in row_units(QUANTITIES[self.name], robot)]
 
 
 VARIABLES = (
@@ -49,16 +57,16 @@ VARIABLES = (
     Variable("joint_positions"),
     Variable("joint_velocities"),
     Variable("contact_positions"),
-    Variable("contact_forces", 50.0),
-    Variable("thrust", 100.0),
-    Variable("thrust_rate", 50.0),
+    Variable("contact_forces", OwnSize(50.0, of_a_point=True)),
+    Variable("thrust", OwnSize(100.0)),
+    Variable("thrust_rate", OwnSize(50.0)),
     Variable("throttle", 50.0),
 )
 """The paper's decision variables of a knot, in their order.
 
 ẍ, ḣω, ḟ and T̈ are no variables: an integration rule makes them differences of these.
 """
-INTERVAL_SCALE = 0.1
+INTERVAL_SCALE = OwnSize(0.1)
 """What the solver sees as one of Δt [s]."""
 
 
@@ -72,14 +80,11 @@ class Layout(Value):
     @classmethod
     def of(cls, robot: Robot, variables: Sequence[Variable] = VARIABLES) -> Layout:
         """Return the layout of variables for a robot."""
-        count = {"robot": 1, "joint": len(robot.joint_names), "contact": len(robot.contacts), "jet": len(robot.jets)}
-        rows, scale, start = {}, list[float](), 0
+        rows, scale = {}, list[float]()
         for variable in variables:
-            quantity = QUANTITIES[variable.name]
-            dimension = quantity.rows * count[quantity.of]
-            rows[variable.name] = slice(start, start + dimension)
-            scale += [variable.scale] * dimension
-            start += dimension
+            own = variable.scales(robot)
+            rows[variable.name] = slice(len(scale), len(scale) + len(own))
+            scale += own
         return cls(rows, np.array(scale))
 
     @property
@@ -147,12 +152,12 @@ def ranges(robot: Robot, scenario: Scenario, layout: Layout) -> Bounds:
         layout: of the variables of a knot.
     """
     limits, jets, count = robot.joint_limits, robot.jets, scenario.knots + 1
-    speed = scenario.base_speed_max
-    reach = np.array(scenario.com_range)
+    speed, turning = scenario.base_speeds(robot)
+    reach = np.array(scenario.com_box(robot))
     box: dict[str, tuple[Any, Any]] = {
         "com_position": (-reach, reach),
         "base_linear_velocity": (-speed, speed),
-        "base_angular_velocity": (-speed, speed),
+        "base_angular_velocity": (-turning, turning),
         "joint_positions": (limits.lower, limits.upper),
         "joint_velocities": (-limits.speed, limits.speed),
         "thrust": (0.0, np.array([jet.thrust_max for jet in jets])),

@@ -18,7 +18,7 @@ from multimodal_to.adam.urdf import parse_urdf, read_urdf
 from multimodal_to.errors import ModelError, unknown
 from multimodal_to.models import attitude, proportions
 from multimodal_to.robots.feet import contact_points
-from multimodal_to.robots.posture import Leg, Stance, mid_range
+from multimodal_to.robots.posture import Leg, Stance, balanced, near_zero
 from multimodal_to.robots.shapes import points_of_links
 from multimodal_to.robots.srdf import GroupState, home_state
 from multimodal_to.robots.structure import (
@@ -194,6 +194,7 @@ def _with_contacts(
     for name_of_leg, leg in standing.items():
         bent_legs += [name_of_leg] if leg.is_straight(stance.joints) else []
         stance = replace(stance, joints=leg.bent(stance.joints))
+    stance = balanced(stance, tuple(standing.values()))
     unfinished = Draft(
         name=name,
         urdf=urdf,
@@ -251,9 +252,9 @@ def _undriven(joint: Joint) -> bool:
 
 
 def _stance(kindyn: KinDynComputations, state: GroupState | None) -> Stance:
-    """Return how the robot stands in an SRDF, or else with joints at zero, or mid-range where that is outside."""
+    """Return how the robot stands in an SRDF, or else with joints at zero, or near zero where that is outside."""
     stated = {} if state is None else state.positions
-    values = [stated.get(joint.name, mid_range(joint.lower, joint.upper)) for joint in kindyn.tree.joints]
+    values = [stated.get(joint.name, near_zero(joint.lower, joint.upper)) for joint in kindyn.tree.joints]
     limits = [(joint.lower, joint.upper) for joint in kindyn.tree.joints]
     joints = np.array([min(max(value, lower), upper) for value, (lower, upper) in zip(values, limits, strict=True)])
     turn = np.eye(3)

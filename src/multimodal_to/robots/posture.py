@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as cs
@@ -22,12 +22,18 @@ _THIGH = 0.8  # of the leg is left where a hip ends [1]
 _LONGEST, _DONE = 0.3, 1e-5  # step [rad]
 _NEAR = 1e-3  # m
 _DAMPING, _PULL = 1e-5, 1e-3
+_SWINGS, _OFF_MIDDLE = 5, 0.4  # how often legs are swung; how far the CoM may be off, of the half-width of the feet [1]
 _AHEAD = 0.2  # what a knee ahead by the length of the leg is worth [rad²]
 
 
-def mid_range(lower: float, upper: float) -> float:
-    """Return zero, or the middle of a range that does not hold zero."""
-    return 0.0 if lower <= 0.0 <= upper else 0.5 * (lower + upper)
+def near_zero(lower: float, upper: float) -> float:
+    """Return zero, or what lies a quarter of the range inside the end nearest to zero, of a range without zero.
+
+    A knee that cannot be straight is bent by so little that its foot is still the lowest part of the leg.
+    """
+    if lower <= 0.0 <= upper:
+        return 0.0
+    return 0.75 * lower + 0.25 * upper if lower > 0.0 else 0.25 * lower + 0.75 * upper
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -145,6 +151,16 @@ class Leg:
                 best, least = found, cost
         return best
 
+    def moved(self, joints: Array, way: Array) -> Array:
+        """Return a posture with the contact points moved along the ground, as near as the leg gets.
+
+        Args:
+            joints: s, (n,).
+            way: how far, along x and y [m], (2,).
+        """
+        wanted = self.places(joints)[0] + np.append(way, 0.0)
+        return self._reached(wanted, joints, joints)
+
     def _ahead(self, joints: Array) -> float:
         """Return how far ahead the links of the leg are together [m]."""
         tree = self.kindyn.tree
@@ -169,6 +185,26 @@ class Leg:
             if np.abs(step).max() < _DONE:
                 break
         return joints
+
+
+def balanced(stance: Stance, legs: Sequence[Leg]) -> Stance:
+    """Return a stance with the CoM above the feet: legs are swung where it is too far from the middle of the feet.
+
+    Args:
+        stance: of the robot.
+        legs: that it stands on.
+    """
+    contacts = [name for leg in legs for name in leg.contacts]
+    for _ in range(_SWINGS):
+        if not legs:
+            break
+        places = stance.places(contacts)[:, :2]
+        way = stance.com[:2] - 0.5 * (places.min(axis=0) + places.max(axis=0))
+        if (np.abs(way) <= _OFF_MIDDLE * 0.5 * np.ptp(places, axis=0) + _NEAR).all():
+            break
+        for leg in legs:
+            stance = replace(stance, joints=leg.moved(stance.joints, way))
+    return stance
 
 
 def _flat(places: Array) -> Array:

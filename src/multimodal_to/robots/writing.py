@@ -15,6 +15,8 @@ from multimodal_to.robots.drafting import Draft
 EFFORT = {"legs": 0.4, "torso": 0.4}
 """Proposed effort of a joint whose URDF states none, by group [m g L]."""
 EFFORT_OF_OTHERS = 0.1  # [m g L]
+DRAG = 0.065
+"""Guessed drag of a rotor: its moment over its thrust, as a share of the rotors' greatest distance from the CoM [1]."""
 THRUST = 2.0
 """Guessed thrust of all jets together [m g]."""
 TIME_CONSTANT = 0.3
@@ -80,7 +82,7 @@ def _groups(draft: Draft) -> Iterator[str]:
 
 
 def _home(draft: Draft) -> Iterator[str]:
-    source = "the URDF's zero, or mid-range where zero is outside"
+    source = "the URDF's zero, or near zero where that is outside"
     if draft.state is not None:
         source = f"the state '{draft.state.name}' of {draft.state.source.name}"
     yield ""
@@ -130,6 +132,8 @@ def _jets(draft: Draft) -> Iterator[str]:
         return
     greatest = THRUST * draft.kindyn.get_total_mass() * _GRAVITY / len(draft.jets)
     greatest = float(f"{greatest:.2g}")
+    away = np.linalg.norm(draft.stance.places(tuple(draft.jets)) - draft.stance.com, axis=1).max()
+    drags = _drags(draft, float(away))
     for frame, axis in draft.jets.items():
         yield ""
         yield "[[jet]]"
@@ -139,14 +143,38 @@ def _jets(draft: Draft) -> Iterator[str]:
         yield 'model = "engine"'
         yield f"thrust_max = {_number(greatest)}  # [N], a guess: all jets together carry {THRUST:g} times the weight"
         yield "throttle = [0.0, 100.0]  # [%]"
-        yield "drag = 0.0  # of a rotor [m]: moment for each newton of thrust, positive about thrust_axis"
-    away = np.linalg.norm(draft.stance.places(tuple(draft.jets)) - draft.stance.com, axis=1).max()
+        guess = "; a guess, neighbours turn opposite ways" if drags[frame] else ""
+        yield (
+            f"drag = {_number(drags[frame])}  # of a rotor [m]: moment for each newton of thrust, positive about "
+            f"thrust_axis{guess}"
+        )
     lag = float(f"{TIME_CONSTANT * (away / _GRAVITY) ** 0.5:.2g}")
     yield ""
     yield "[jet_models.engine]  # guesses: how fast and how strongly the thrust follows the throttle"
     yield 'kind = "first-order"'
     yield f"gain = {_number(greatest / 100.0)}  # [N/%]"
     yield f"time_constant = {_number(lag)}  # [s]"
+
+
+def _drags(draft: Draft, away: float) -> dict[str, float]:
+    """Return the drag of each rotor [m]; zero where joints turn the jets, or where they are no even ring.
+
+    A body with a ring of rotors and nothing that moves turns about the vertical by their drag alone. So neighbours have
+    opposite signs.
+
+    Args:
+        draft: with its jets.
+        away: how far the farthest of them is from the CoM [m].
+    """
+    count = len(draft.jets)
+    if draft.kindyn.joint_names or count < 4 or count % 2:
+        return dict.fromkeys(draft.jets, 0.0)
+    places = draft.stance.places(tuple(draft.jets)) - draft.stance.com
+    around = np.argsort(np.arctan2(places[:, 1], places[:, 0]))
+    signs = np.empty(count)
+    signs[around] = np.where(np.arange(count) % 2, -1.0, 1.0)
+    size = float(f"{DRAG * away:.2g}")
+    return {frame: size * float(sign) for frame, sign in zip(draft.jets, signs, strict=True)}
 
 
 def _number(value: float) -> str:

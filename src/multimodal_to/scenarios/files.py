@@ -120,17 +120,27 @@ def change(scenario: Scenario, settings: Iterable[str]) -> Scenario:
     """
     table: dict[str, Any] = {}
     for setting in settings:
-        key, equals, text = (part.strip() for part in setting.partition("="))
-        if not (key and equals and text):
-            raise ScenarioError(f"'{shortened(setting, 100)}' is no change of a scenario; expected key=value")
+        key, value = parted(setting)
         *parents, last = key.split(".")
         place = table
         for parent in parents:
             place = place.setdefault(parent, {})
             if not isinstance(place, dict):
                 raise ScenarioError(f"'{shortened(setting, 100)}': another change gives '{parent}' as a whole")
-        place[last] = _value(text)
+        place[last] = value
     return from_dict(table, scenario)
+
+
+def parted(setting: str) -> tuple[str, Any]:
+    """Return key and value of a text such as `final_com_height=0.8`; the value is as TOML has it.
+
+    Raises:
+        ScenarioError: it is no `key=value`.
+    """
+    key, equals, text = (part.strip() for part in setting.partition("="))
+    if not (key and equals and text):
+        raise ScenarioError(f"'{shortened(setting, 100)}' is no change of a scenario; expected key=value")
+    return key, _value(text)
 
 
 def _value(text: str) -> Any:

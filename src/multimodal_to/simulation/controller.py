@@ -15,6 +15,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
+from multimodal_to.models.units import Units
 from multimodal_to.simulation.model import SimulationModel, mujoco_module
 from multimodal_to.simulation.reference import Reference
 from multimodal_to.simulation.stage import stage
@@ -181,3 +182,15 @@ def row_of(time: float, period: float, plan: Reference) -> int:
         plan: the reference.
     """
     return min(max(round(time / period), 0), len(plan.com) - 1)
+
+
+def servo(units: Units, count: int, stiffness: float, damping: float) -> tuple[Array, Array]:
+    """Return K [N m/rad] and D [N m s/rad] of joints' servos, (count,) each.
+
+    Args:
+        units: the robot's own.
+        count: of joints.
+        stiffness: K [m g L/rad].
+        damping: D [m g L √(L/g)/rad].
+    """
+    return np.full(count, stiffness * units.moment), np.full(count, damping * units.moment / units.frequency)

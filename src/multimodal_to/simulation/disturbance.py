@@ -15,7 +15,6 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.scenario import Vector3
 from multimodal_to.simulation.model import SimulationModel, body_name, mujoco_module
 from multimodal_to.simulation.noise import Noise
-from multimodal_to.simulation.units import Units
 from multimodal_to.values import FrozenMapping
 
 MASS_SPREAD, GAIN_SPREAD, FRICTION_SPREAD = 0.05, 0.2, 0.2  # each is drawn within ± this share [1]
@@ -111,7 +110,7 @@ def draw(
     delay = float(rng.uniform(*DELAY))
     start = float(rng.uniform(0.0, max(duration - PUSH_TIME, 0.0)))
     angle = float(rng.uniform(-np.pi, np.pi))
-    strength = PUSH * Units.of(robot).force if push is None else push
+    strength = PUSH * robot.units.force if push is None else push
     force = (strength * float(np.cos(angle)), strength * float(np.sin(angle)), 0.0)
     return Disturbance(
         masses=FrozenMapping(masses),

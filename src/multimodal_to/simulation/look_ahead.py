@@ -23,17 +23,17 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.jet import Jet, JetModel
 from multimodal_to.models.state import State
+from multimodal_to.models.units import Sized
 from multimodal_to.simulation.controller import Belief
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference
 from multimodal_to.simulation.stabiliser import JOINT_MAX, effect_of_joints, rotation_vector, skew
-from multimodal_to.simulation.units import Units
 
 GRID = 0.02  # between two rows of the gains [s]
 SETTLING = 4.0  # how long the end is held for the gains there [s]
 TURBINE = 0.5  # how long a turbine takes, roughly [s]
 FLYING = 0.4  # joints help only while the feet carry less than this [m g]
-FORGETTING = 1.0  # time constant with which sums of errors go while a foot stands [s]
+FORGETTING = Sized(1.0, "s")  # time constant with which sums of errors go while a foot stands
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +89,7 @@ class Feedback:
         self._every = max(round(GRID / period), 1)
         self._standing = self._gains(how, stands=True)
         self._flying = self._gains(how, stands=False) if belief.simulation.robot.jets else self._standing
+        self._forgetting = FORGETTING.of(belief.simulation.robot.units)
         self._sums = np.zeros(6)
 
     def advise(self, state: State, step: int) -> Advice:
@@ -108,7 +109,7 @@ class Feedback:
         place = data.subtree_com[1] - plan.com[step]
         turn = rotation_vector(self._belief.rotation @ plan.rotation[step].T)
         turn = turn + gains.turning[row] @ (state.joint_positions - plan.joints[step])
-        rate = -self._sums / FORGETTING if stands else np.concatenate([place, turn])
+        rate = -self._sums / self._forgetting if stands else np.concatenate([place, turn])
         self._sums = self._sums + self._period * rate
         errors = np.concatenate(
             [
@@ -126,7 +127,7 @@ class Feedback:
 
     def _gains(self, how: LookAhead, *, stands: bool) -> _Gains:
         belief, plan, robot = self._belief, self._plan, self._belief.simulation.robot
-        jets, units = len(robot.jets), Units.of(robot)
+        jets, units = len(robot.jets), robot.units
         ahead = round(TURBINE / self._period)
         systems = [
             _System.at(belief, plan, row, ahead, how, stands=stands) for row in range(0, len(plan.com), self._every)
@@ -181,7 +182,7 @@ class _System:
         moments = np.cross(arms, thrusts) + drags * thrusts
         points, forces = data.geom_xpos[simulation.points] - com, plan.contact_forces[row] * stands
         load = np.maximum(forces[:, 2], 0.0)
-        units = Units.of(robot)
+        units = robot.units
         soon = plan.contact_forces[row : row + ahead, :, 2].sum(axis=1).min(initial=units.force)
         free = float(np.clip(1.0 - soon / units.force, 0.0, 1.0)) if stands else 1.0
 

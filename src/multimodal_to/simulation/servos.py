@@ -10,13 +10,12 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
-from multimodal_to.simulation.controller import Belief, Command, Servos, row_of
+from multimodal_to.simulation.controller import Belief, Command, Servos, row_of, servo
 from multimodal_to.simulation.look_ahead import Feedback, LookAhead
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
 from multimodal_to.simulation.stabiliser import Balance, BalanceGains, correct
 from multimodal_to.simulation.turbines import around
-from multimodal_to.simulation.units import Units
 from multimodal_to.trajectory import Trajectory
 
 JOINT_LAG = 0.03  # with which joints take over the stabiliser's wish [s]
@@ -70,11 +69,11 @@ class ServoController:
         self._belief = Belief.of(robot, plan, self._belief)
         self._robot, self._since = robot, since
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
-        units, gains = Units.of(robot), self._gains
+        units, gains = robot.units, self._gains
         self._balance = Balance(gains=gains, units=units, inertia=inertia(robot), friction=self._belief.friction)
         self._feedback = Feedback(self._belief, self._plan, PERIOD, gains.look_ahead)
         count = len(robot.joint_names)
-        self._servo = units.servo(count, gains.stiffness, gains.damping)
+        self._servo = servo(units, count, gains.stiffness, gains.damping)
         if first:
             self._shift = np.zeros(count)
 

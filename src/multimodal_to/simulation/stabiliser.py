@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
+from multimodal_to.models.units import Units
 from multimodal_to.simulation.model import SimulationModel, mujoco_module
 from multimodal_to.simulation.reference import Reference
-from multimodal_to.simulation.units import Units
 from multimodal_to.trajectory.derived import flight_force
 
 FORCE_WEIGHT, MOMENT_WEIGHT = 440.0, 1250.0  # W, of forces [1/(m g)] and of moments [1/(m g L)]

@@ -27,22 +27,22 @@ from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.models.terrain import FlatGround, frame_function
+from multimodal_to.models.units import Sized, Units
 from multimodal_to.scenarios.data import stored
-from multimodal_to.simulation.controller import Belief, Command, Servos, row_of
+from multimodal_to.simulation.controller import Belief, Command, Servos, row_of, servo
 from multimodal_to.simulation.feet import PlannedFeet
 from multimodal_to.simulation.look_ahead import Feedback, LookAhead
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
 from multimodal_to.simulation.stabiliser import rotation_vector, skew
 from multimodal_to.simulation.turbines import around
-from multimodal_to.simulation.units import Units
 from multimodal_to.trajectory import Trajectory
 
 PERIOD = 2e-3  # between two commands [s]
 NEAR = 3.5e-3
 """A foot that the plan loads may push while it is nearer to the ground than this [L]: 2 mm of the iRonCub."""
-STUCK = 0.02  # how long a foot counts as near after it was so [s]
-SOON = 0.25  # how long before it is loaded a foot that is near counts as standing [s]
+STUCK = Sized(0.02, "s")  # how long a foot counts as near after it was so
+SOON = Sized(0.25, "s")  # how long before it is loaded a foot that is near counts as standing
 LOADED = 0.01  # a foot with more planned load than this stands [m g]
 DOWN = 0.0126  # how fast a foot goes on down that should stand already [√(g L)]
 SIDES = 8  # of the pyramid within a friction cone
@@ -161,7 +161,7 @@ class WholeBodyController:
             since: when the plan's first knot is or was, since the simulation's start [s].
         """
         first, self._robot, self._since = self._robot is None, robot, since
-        self._units, self._belief = Units.of(robot), Belief.of(robot, plan, None if first else self._belief)
+        self._units, self._belief = robot.units, Belief.of(robot, plan, None if first else self._belief)
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
         self._feet = PlannedFeet.along(self._belief, self._plan, PERIOD)
         self._feedback = Feedback(self._belief, self._plan, PERIOD, self._gains.look_ahead)
@@ -170,7 +170,7 @@ class WholeBodyController:
         self._ground = frame_function(surface).map(len(robot.contacts)) if robot.contacts else None
         self._legs = self._joints_of_feet()
         count, units = len(robot.joint_names), self._units
-        self._servo = units.servo(count, self._gains.stiffness, self._gains.damping)
+        self._servo = servo(units, count, self._gains.stiffness, self._gains.damping)
         if first:
             self._shift, self._torques = np.zeros(count), np.zeros(count)
             self._near = np.full(len(robot.feet), -np.inf)  # when each foot was near the ground last [s]
@@ -249,14 +249,14 @@ class WholeBodyController:
             return [], self._contacts(points, jacobians, cones)
         positions = data.geom_xpos[simulation.points]
         heights, normals, tangents = (np.array(part) for part in self._ground(positions.T))
-        until = min(step + round(SOON / PERIOD), feet.load.shape[1] - 1)
+        until = min(step + round(SOON.of(units) / PERIOD), feet.load.shape[1] - 1)
         for foot, (own, body) in enumerate(zip(feet.members, feet.bodies, strict=True)):
             loaded = feet.load[foot, step] > LOADED * units.force
             soon = bool((feet.load[foot, step : until + 1] > LOADED * units.force).any())
             lowest = float(heights[0, own].min())
             if lowest < 0.2 * NEAR * units.length:
                 self._near[foot] = time
-            close = lowest < NEAR * units.length or time - self._near[foot] < STUCK
+            close = lowest < NEAR * units.length or time - self._near[foot] < STUCK.of(units)
             jacobian, moving, turn = self._motion(foot, step, positions[own].mean(axis=0), body)
             speed, drift = moving
             if close and (loaded or (soon and feet.velocity[foot, step, 2] < DOWN * units.length * units.frequency)):

@@ -1,0 +1,85 @@
+"""What the starter tasks share: what is given of contacts and bounds, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from multimodal_to.errors import ScenarioError
+from multimodal_to.models.robot import Robot
+from multimodal_to.models.units import Units
+from multimodal_to.scenarios.contacts import ContactState, ContactStretch
+
+_SPEED = 4.0
+"""Greatest speed of the base [√(g L)] and, where that is more, greatest rate [√(g/L)]."""
+_LINE = 0.02
+"""Contact points that are no farther from a line are on it [L]."""
+
+
+def speed_max(units: Units) -> float:
+    """Return the greatest size of each component of the base's twist [m/s, rad/s]."""
+    return _SPEED * max(units.of("m/s"), units.of("rad/s"))
+
+
+def com_range(robot: Robot, way: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return how far the CoM may be from the origin [m]: the length of the way, and twice the standing height more."""
+    room = math.hypot(*way) + 2.0 * robot.standing_height
+    x, y, z = (abs(home) + room for home in robot.home_com)
+    return x, y, z
+
+
+def given(robot: Robot, state: ContactState, begin: float, end: float, clearance: float = 0.0) -> ContactStretch:
+    """Return a stretch that is given of all feet.
+
+    Feet on legs without joints are not given to stand, but free to: they would be held by more rows than the body has
+    ways to move.
+
+    Args:
+        robot: whose feet they are.
+        state: what is given.
+        begin: of the stretch, as a share of the horizon [1].
+        end: of the stretch, as a share of the horizon [1].
+        clearance: least height in its middle [m].
+    """
+    if state is ContactState.ON and not robot.joint_names:
+        state = ContactState.FREE
+    return ContactStretch(of=tuple(robot.feet), state=state, begin=begin, end=end, clearance=clearance)
+
+
+def refuse_footless(robot: Robot, name: str) -> None:
+    """Refuse a robot that does not stand for the task of a name.
+
+    Raises:
+        ScenarioError: it has no contact points, or all of them are on a line, about which it falls.
+    """
+    if not robot.contacts:
+        raise ScenarioError(f"{robot.name} has no contact points; expected a robot with feet for '{name}'")
+    posture = robot.home
+    places = np.array(
+        [
+            np.array(robot.kindyn.forward_kinematics(one, posture.base_transform, posture.joint_positions))[:2, 3]
+            for one in robot.contact_names
+        ]
+    )
+    if len(places) < 3 or np.linalg.svd(places - places.mean(axis=0))[1][1] < _LINE * robot.standing_height:
+        raise ScenarioError(
+            f"{robot.name} has its contact points on a line, about which it falls; expected feet that hold it upright "
+            f"for '{name}', which starts or ends at rest"
+        )
+
+
+def positive(name: str, number: float, unit: str) -> float:
+    """Return a number that has to be positive.
+
+    Args:
+        name: of the number.
+        number: what it is.
+        unit: of the number.
+
+    Raises:
+        ScenarioError: it is not positive.
+    """
+    if not 0.0 < number < math.inf:
+        raise ScenarioError(f"{name} is {number}; expected a positive number [{unit}]")
+    return number
