@@ -10,7 +10,7 @@ from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.contacts import ContactState
 from multimodal_to.scenarios.gaits import GaitKind, GaitPlan, groups_of
-from multimodal_to.scenarios.keyframes import HOME, Keyframe
+from multimodal_to.scenarios.keyframes import END, HOME, Keyframe, Momentum
 from multimodal_to.scenarios.scenario import Margins, Scenario, Terminal
 from multimodal_to.tasks.costs import weights
 from multimodal_to.tasks.given import com_range, given, positive, refuse_footless, speed_max
@@ -77,6 +77,7 @@ def jump(robot: Robot, *, height: float | None = None) -> Scenario:
         interval=flight / in_air,
         margins=Margins(touch_down_speed=math.sqrt(2.0 * height / length)),
         mid_height_min=robot.home_com[2] + height,
+        keyframes=(Keyframe(when=END, momentum=Momentum(linear=(0.0, 0.0, 0.0))),),
         contacts=(
             given(robot, ContactState.ON, 0.0, begin),
             given(robot, ContactState.OFF, begin, end, clearance=0.5 * height),
