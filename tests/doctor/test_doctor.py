@@ -94,7 +94,7 @@ HOPELESS = {
     "a height outside the range": (
         same,
         "take-off-and-landing",
-        {"mid_height_min": 1.6},
+        {"mid_height_min": 1.6, "com_range": (1.5, 1.5, 1.5)},
         "bounds",
         "at least 1.6 and at most 1.5 m at knot 100",
     ),
@@ -332,7 +332,7 @@ def test_the_command_prints_its_findings_for_programs():
 
 
 def test_a_scenario_that_cannot_be_made_is_one_finding(tmp_path):
-    (tmp_path / "far.toml").write_text('based_on = "take-off"\nfinal_com = [0.0, 0.0, 2.0]\n')
+    (tmp_path / "far.toml").write_text('based_on = "take-off"\nfinal_com = [0, 0, 2]\ncom_range = [1.5, 1.5, 1.5]\n')
     result = CliRunner().invoke(app, ["doctor", str(tmp_path / "far.toml")])
     assert result.exit_code == 2
     assert "far.toml: final_com has z = 2.0 m, beyond com_range, 1.5 m" in result.stdout

@@ -33,8 +33,11 @@ def test_the_take_off_has_the_numbers_of_the_paper(scenario):
         ({"knots": 2}, "knots is 2; expected 3 to"),
         ({"interval_min": 0.2}, "expected 0 < interval_min <= interval_max"),
         ({"final_com": (0.0, 0.0, float("nan"))}, "expected three finite numbers"),
-        ({"final_com": (0.0, 0.0, 2.0)}, "beyond com_range"),
-        ({"initial_com": (0.0, -1.6, 0.57)}, "initial_com has y = -1.6 m, beyond com_range"),
+        ({"final_com": (0.0, 0.0, 2.0), "com_range": (1.0, 1.0, 1.5)}, "beyond com_range"),
+        (
+            {"initial_com": (0.0, -1.6, 0.57), "com_range": (1.5, 1.5, 1.5)},
+            "initial_com has y = -1.6 m, beyond com_range",
+        ),
         ({"complementarity_max": 0.0}, "complementarity_max is 0.0; expected a positive number"),
         ({"sliding_max": -1.0}, "sliding_max is -1.0; expected a positive number"),
         ({"friction": -0.1}, "friction is -0.1; expected a positive number"),

@@ -162,7 +162,7 @@ def test_a_task_that_is_feasible_is_called_so_and_is_solved_from_the_motion_that
     )
     out = folder / "out"
     options = ("--no-pictures", "-o", out)
-    result = run("solve", folder / "hop.toml", "--explain", "--max-iterations", 150, *options)
+    result = run("solve", folder / "hop.toml", "--explain", "--max-iterations", 60, *options)
     assert result.returncode == 1
     assert "explain: nothing has to give way, all rows can be met together" in result.stdout
     again = run("solve", folder / "hop.toml", "--warm-start", out / "explained.npz", *options)

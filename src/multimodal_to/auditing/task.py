@@ -72,12 +72,13 @@ def _between(motion: Motion, scenario: Scenario) -> list[Worst]:
     """How far quantities are beyond the scenario's ranges; zero or less is within them."""
     trajectory, steps = motion.trajectory, np.diff(motion.trajectory.time)
     twists = np.abs(np.vstack([trajectory.base_linear_velocity, trajectory.base_angular_velocity]))
-    away = np.abs(trajectory.com_position) - np.reshape(scenario.com_range, (3, 1))
+    fastest = np.repeat(scenario.base_speeds(motion.robot), 3)[:, None]
+    away = np.abs(trajectory.com_position) - np.reshape(scenario.com_box(motion.robot), (3, 1))
     off_time = np.maximum(steps - scenario.interval_max, scenario.interval_min - steps)
     findings = [
         Worst(name="knots", worst=abs(trajectory.knots - scenario.knots), knot=trajectory.knots),
         worst_of("time step range", off_time, first=1),
-        worst_of("base speed range", twists - scenario.base_speed_max),
+        worst_of("base speed range", twists - fastest),
         worst_of("CoM range", away, ("x", "y", "z")),
     ]
     if scenario.mid_height_min is not None:

@@ -63,7 +63,7 @@ def _flights(task: Task, schedule: Schedule) -> Iterator[Symptom]:
     if task.lifts:
         return
     robot, scenario = task.robot, task.scenario
-    gravity = robot.weight / robot.mass
+    gravity, (fastest, _) = robot.weight / robot.mass, scenario.base_speeds(robot)
     for first, last in runs(schedule.in_air):
         intervals = last - first + (1 if first and last < scenario.knots else 0.5)
         time = intervals * scenario.interval_min
@@ -72,12 +72,12 @@ def _flights(task: Task, schedule: Schedule) -> Iterator[Symptom]:
         speed = 0.5 * gravity * time
         found = (
             f"all feet are off from knot {first} to {last}, at least {time:.3g} s, and the jets do not carry the "
-            f"weight: the CoM has to take off at {apart(speed, scenario.base_speed_max)} m/s to be back at its height, "
-            f"and base_speed_max is {scenario.base_speed_max:g} m/s"
+            f"weight: the CoM has to take off at {apart(speed, fastest)} m/s to be back at its height, "
+            f"and base_speed_max is {fastest:.3g} m/s"
         )
-        if speed > scenario.base_speed_max:
+        if speed > fastest:
             lower = 2.0 * robot.contact_reach[2] / time
-            yield (error if speed - lower > scenario.base_speed_max else warning)(
+            yield (error if speed - lower > fastest else warning)(
                 _NAME, found, "let the feet be off for a shorter time, or allow more base_speed_max"
             )
 

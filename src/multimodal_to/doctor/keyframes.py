@@ -87,6 +87,7 @@ def turns(task: Task) -> Iterator[Symptom]:
     Each component of ω is at most `base_speed_max`, so that its length is at most √3 as much.
     """
     scenario, robot = task.scenario, task.robot
+    _, fastest = scenario.base_speeds(robot)
     before: tuple[str, int, Array] | None = None
     if not task.stands_at_start or task.start_posture is not None:
         standing = task.start_posture.base_quaternion_xyzw if task.start_posture else robot.upright.base_quaternion_xyzw
@@ -101,12 +102,12 @@ def turns(task: Task) -> Iterator[Symptom]:
             label, knot, here = before
             angle = 2.0 * math.acos(min(abs(float(here @ there)), 1.0)) - keyframe.orientation_tolerance
             time = (one.knot - knot) * scenario.interval_max
-            if angle > scenario.base_speed_max * time:
-                certain = angle > 1.8 * scenario.base_speed_max * time and keyframe.hover
+            if angle > fastest * time:
+                certain = angle > 1.8 * fastest * time and keyframe.hover
                 yield (error if certain else warning)(
                     one.label,
-                    f"the base has to turn by {apart(angle, scenario.base_speed_max * time)} rad from {label} in at "
-                    f"most {time:.3g} s, and base_speed_max is {scenario.base_speed_max:g} rad/s",
+                    f"the base has to turn by {apart(angle, fastest * time)} rad from {label} in at "
+                    f"most {time:.3g} s, and base_speed_max is {fastest:.3g} rad/s",
                     "ask for it at a later knot, allow a longer interval_max or more base_speed_max",
                 )
         before = (one.label, one.knot, there)

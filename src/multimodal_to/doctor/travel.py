@@ -23,9 +23,10 @@ _LIMBS = 0.25
 def speed(task: Task) -> Iterator[Symptom]:
     """Compare the stretches that the CoM has to travel with the greatest base speed and the longest time."""
     scenario = task.scenario
+    fastest, _ = scenario.base_speeds(task.robot)
 
     def furthest(intervals: int) -> float:
-        return intervals * scenario.interval_max * scenario.base_speed_max
+        return intervals * scenario.interval_max * fastest
 
     start, end = np.array(scenario.start_com), np.array(scenario.end_com)
     stretches = [("from start to end", float(np.abs(end - start).max()), task.moving_intervals)]
@@ -44,7 +45,7 @@ def speed(task: Task) -> Iterator[Symptom]:
         "time for the distance",
         f"the CoM has to go {apart(distance, furthest(intervals))} m {label} in at most "
         f"{intervals * scenario.interval_max:.4g} s ({intervals} intervals in which it can move), and "
-        f"base_speed_max is {scenario.base_speed_max:g} m/s",
+        f"base_speed_max is {fastest:.3g} m/s",
         "allow more knots, a longer interval_max or more speed",
     )
 
@@ -130,6 +131,7 @@ def _leap(task: Task, label: str, rise: float, knot: int) -> Iterator[Symptom]:
         knot: at which.
     """
     scenario, gravity = task.scenario, task.robot.weight / task.robot.mass
+    fastest, _ = scenario.base_speeds(task.robot)
     lift_off, climb = math.sqrt(2 * gravity * rise), math.sqrt(2 * rise / gravity)
     found = f"{label} is {rise:.3g} m above where feet on the ground let the CoM be; a jump there"
     before, after = (count * scenario.interval_max for count in (knot, scenario.knots - knot))
@@ -146,12 +148,11 @@ def _leap(task: Task, label: str, rise: float, knot: int) -> Iterator[Symptom]:
             f"start and {after:.3g} s before the end",
             "allow more knots or a longer interval_max, or ask for it at another knot",
         )
-    elif lift_off > scenario.base_speed_max:
-        certain = rise - _LIMBS * task.robot.contact_reach[2] > scenario.base_speed_max * climb
+    elif lift_off > fastest:
+        certain = rise - _LIMBS * task.robot.contact_reach[2] > fastest * climb
         yield (error if certain else warning)(
             "leap",
-            f"{found} without jets lifts off at {lift_off:.2g} m/s, and base_speed_max is "
-            f"{scenario.base_speed_max:g} m/s",
+            f"{found} without jets lifts off at {lift_off:.2g} m/s, and base_speed_max is {fastest:.3g} m/s",
             "ask for less height, allow more base_speed_max, or turn the jets on",
         )
     elif 2 * climb < _FEWEST * scenario.interval_min:

@@ -15,7 +15,7 @@ from multimodal_to.errors import ScenarioError
 from multimodal_to.models.attitude import signed_like
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Surface, heights_below
-from multimodal_to.models.units import Sized
+from multimodal_to.models.units import ONE, Sized
 from multimodal_to.ocp import waypoints
 from multimodal_to.ocp.flights import flights, interval, thrown
 from multimodal_to.ocp.gait import GROUNDED, footfalls, steps
@@ -73,7 +73,9 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
     the feet's places may lead it astray; where they do, it starts again from a posture that leaves them out.
     """
     tree, home, limits, count = robot.kindyn.tree, robot.home, robot.joint_limits, len(robot.joint_names)
-    position, tilt, joints = cs.SX.sym("p", 3), cs.SX.sym("tilt", 3), cs.SX.sym("s", count)
+    length = ONE.of("m", robot.units)  # what the solver takes for one
+    scaled_position, tilt, joints = cs.SX.sym("p", 3), cs.SX.sym("tilt", 3), cs.SX.sym("s", count)
+    position = length * scaled_position
     weight = cs.SX.sym("weight")
     orientation = quaternion.product(quaternion.exp(tilt), cs.DM(home.base_quaternion_xyzw))
     base = Pose(quaternion.rotation_matrix(orientation), position)
@@ -85,10 +87,10 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
         *((point - com - place)[:2] / robot.standing_height for point, place in zip(points, places, strict=True))
     )
     problem = {
-        "x": cs.vertcat(position, tilt, joints),
+        "x": cs.vertcat(scaled_position, tilt, joints),
         "p": weight,
         "f": cs.sumsqr(joints - home.joint_positions) + cs.sumsqr(tilt) + weight * cs.sumsqr(moved),
-        "g": cs.vertcat(centroidal.com_position(tree, base, joints), *heights),
+        "g": cs.vertcat(centroidal.com_position(tree, base, joints), *heights) / length,
     }
     options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}}
     solver = cs.nlpsol("standing_posture", "ipopt", problem, options)
@@ -99,12 +101,12 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
             p=places_weight,
             lbx=np.concatenate([np.full(3, -np.inf), np.full(3, -tilt_max), limits.lower]),
             ubx=np.concatenate([np.full(3, np.inf), np.full(3, tilt_max), limits.upper]),
-            lbg=np.concatenate([com, np.zeros(len(heights))]),
-            ubg=np.concatenate([com, np.full(len(heights), _CONTACT_TOLERANCE.of(robot.units))]),
+            lbg=np.concatenate([com, np.zeros(len(heights))]) / length,
+            ubg=np.concatenate([com, np.full(len(heights), _CONTACT_TOLERANCE.of(robot.units))]) / length,
         )
         return np.array(result["x"]).ravel() if solver.stats()["success"] else None
 
-    lifted = np.concatenate([home.base_position + com - at_home, np.zeros(3), home.joint_positions])
+    lifted = np.concatenate([(home.base_position + com - at_home) / length, np.zeros(3), home.joint_positions])
     values = searched(lifted, PLACES_WEIGHT)
     if values is None:
         values = searched(lifted, 0.0)
@@ -114,7 +116,7 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
         values = values if nearer is None else nearer
     turned = cs.Function("turned", [tilt], [orientation])(values[3:6])
     return Posture(
-        base_position=values[:3],
+        base_position=length * values[:3],
         base_quaternion_xyzw=np.array(turned).ravel(),
         joint_positions=np.clip(values[6:], limits.lower, limits.upper),
     )

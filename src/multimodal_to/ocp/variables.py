@@ -152,12 +152,12 @@ def ranges(robot: Robot, scenario: Scenario, layout: Layout) -> Bounds:
         layout: of the variables of a knot.
     """
     limits, jets, count = robot.joint_limits, robot.jets, scenario.knots + 1
-    speed = scenario.base_speed_max
-    reach = np.array(scenario.com_range)
+    speed, turning = scenario.base_speeds(robot)
+    reach = np.array(scenario.com_box(robot))
     box: dict[str, tuple[Any, Any]] = {
         "com_position": (-reach, reach),
         "base_linear_velocity": (-speed, speed),
-        "base_angular_velocity": (-speed, speed),
+        "base_angular_velocity": (-turning, turning),
         "joint_positions": (limits.lower, limits.upper),
         "joint_velocities": (-limits.speed, limits.speed),
         "thrust": (0.0, np.array([jet.thrust_max for jet in jets])),

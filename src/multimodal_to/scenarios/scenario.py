@@ -14,6 +14,7 @@ from multimodal_to.errors import ScenarioError, listed, shown
 from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Surface, heights_below
+from multimodal_to.models.units import OwnSize
 from multimodal_to.scenarios.contacts import ContactStretch
 from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitPlan
@@ -40,6 +41,7 @@ COMPLEMENTARITY = 1.6e-4
 """ε_n where a scenario says none [m g L / n]: half of what the audit lets height × normal force be."""
 SLIDING = 6.4e-5
 """ε_t where a scenario says none [m g L / n]: tighter, because slips add up while a foot stands."""
+_BASE_SPEED, _COM_RANGE = OwnSize(2.0), OwnSize(1.5)
 _LONGEST_NAME = 100
 
 
@@ -220,10 +222,10 @@ class Scenario:
     """ε_n, greatest height × normal force of a contact point [N m]; where there is none, 1.6e-4 m g L / n."""
     sliding_max: float | None = None
     """ε_t, greatest slip over an interval × normal force [N m]; where there is none, 6.4e-5 m g L / n."""
-    base_speed_max: float = 2.0
-    """Greatest size of each component of the base's twist [m/s, rad/s]."""
-    com_range: Vector3 = (1.5, 1.5, 1.5)
-    """The CoM's greatest distance from the world's origin, by axis [m]."""
+    base_speed_max: float | None = None
+    """Greatest size of each component of the base's twist [m/s, rad/s]; by default it follows from the robot."""
+    com_range: Vector3 | None = None
+    """The CoM's greatest distance from the world's origin, by axis [m]; by default it follows from the robot."""
     allowances: Mapping[str, float] = field(default_factory=dict)
     """Limits of the audit's properties by name, where they are wider than the audit's own [the property's own]."""
     guess_steps: int = 0
@@ -263,6 +265,44 @@ class Scenario:
         """
         unit = robot.weight * robot.standing_height / max(len(robot.contacts), 1)
         return self.complementarity_max or COMPLEMENTARITY * unit, self.sliding_max or SLIDING * unit
+
+    @checked
+    def base_speeds(self, robot: Robot) -> tuple[float, float]:
+        """Return how fast the base may be along an axis [m/s] and about one [rad/s].
+
+        By default 2 m/s and 2 rad/s for the iRonCub, in the robot's own units for others. Where a robot has no jets it
+        may be as fast as a throw to the highest CoM that is asked for: √(2 g Δ), Δ above the start.
+        """
+        if self.base_speed_max is not None:
+            return self.base_speed_max, self.base_speed_max
+        linear, angular = (_BASE_SPEED.of(unit, robot.units) for unit in ("m/s", "rad/s"))
+        heights = self._asked_of_com("z")
+        rise = max(heights) - heights[0] if heights and not robot.jets else 0.0
+        return max(linear, math.sqrt(2.0 * robot.units.gravity * rise)), angular
+
+    @checked
+    def com_box(self, robot: Robot) -> Vector3:
+        """Return how far the CoM may be from the world's origin, by axis [m].
+
+        By default 1.5 m for the iRonCub, in the robot's own length for others, and at least half of L beyond what is
+        asked for.
+        """
+        if self.com_range is not None:
+            return self.com_range
+        least = _COM_RANGE.of("m", robot.units)
+        x, y, z = (
+            max([least, *(abs(one) + 0.5 * robot.units.length for one in self._asked_of_com(axis))]) for axis in AXES
+        )
+        return x, y, z
+
+    def _asked_of_com(self, axis: str) -> list[float]:
+        """Return which coordinates along an axis the CoM is asked to have, or to be above [m]; of a state's none."""
+        ends = (self.initial_com, self.final_com, *(one.com for one in self.keyframes))
+        asked = [by_axis(one) for one in ends if not isinstance(one, str)]
+        asked += [one.com_min for one in self.keyframes]
+        if self.mid_height_min is not None:
+            asked.append({"z": self.mid_height_min})
+        return [one[axis] for one in asked if axis in one]
 
     # ---------------------------------------------------------------- keyframes
 
@@ -463,13 +503,15 @@ class Scenario:
         for label in ("initial_com", "final_com"):
             if not isinstance(position := getattr(self, label), tuple):
                 continue
-            for axis, number, bound in zip(AXES, position, self.com_range, strict=True):
+            for axis, number, bound in zip(AXES, position, self.com_range or (math.inf,) * 3, strict=True):
                 if abs(number) > bound:
                     raise ScenarioError(f"{label} has {axis} = {number} m, beyond com_range, {bound} m")
 
     def _check_reach(self) -> None:
         """Refuse a distance that the CoM cannot travel at the greatest base speed in the longest time."""
         longest = self.knots * self.interval_max
+        if self.base_speed_max is None:
+            return
         if not (isinstance(self.initial_com, tuple) and isinstance(self.final_com, tuple)):
             return
         for axis, start, end in zip(AXES, self.initial_com, self.final_com, strict=True):
