@@ -71,7 +71,6 @@ def in_own_units(scenario, units):
     time, length, weights = units.of("s"), units.of("m"), scenario.weights
     numbers = {"interval": scenario.interval_max / time}
     numbers["height"] = (scenario.mid_height_min or length) / length
-    numbers |= {f"range {axis}": value / length for axis, value in zip("xyz", scenario.com_range, strict=True)}
     numbers |= {name: getattr(weights, name) * units.of(unit) ** 2 * time for name, unit in RUNNING.items()}
     return numbers
 

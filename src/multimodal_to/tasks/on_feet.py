@@ -13,7 +13,7 @@ from multimodal_to.scenarios.gaits import GaitKind, GaitPlan, groups_of
 from multimodal_to.scenarios.keyframes import END, HOME, Keyframe, Momentum
 from multimodal_to.scenarios.scenario import Margins, Scenario, Terminal
 from multimodal_to.tasks.costs import weights
-from multimodal_to.tasks.given import com_range, given, positive, refuse_footless, speed_max
+from multimodal_to.tasks.given import given, positive, refuse_footless
 
 DEPTH, HEIGHT = 0.2, 0.15
 """How far a robot squats and jumps by default [L]."""
@@ -168,7 +168,6 @@ def _gait(robot: Robot, name: str, title: str, kind: GaitKind, way: tuple[float,
 def _on_feet(robot: Robot, name: str, title: str, *, knots: int, interval: float, **more: Any) -> Scenario:
     refuse_footless(robot, name)
     time = robot.units.of("s")
-    way = more.get("final_com_shift", (0.0, 0.0, 0.0))
     return Scenario(
         name=name,
         title=title,
@@ -180,8 +179,6 @@ def _on_feet(robot: Robot, name: str, title: str, *, knots: int, interval: float
         interval_min=interval * time,
         interval_max=interval * time,
         weights=weights(robot, robot.units),
-        base_speed_max=speed_max(robot.units),
-        com_range=com_range(robot, way),
         **more,
     )
 
