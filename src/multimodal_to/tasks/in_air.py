@@ -21,7 +21,7 @@ from multimodal_to.scenarios.contacts import ContactState
 from multimodal_to.scenarios.keyframes import HOME
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 from multimodal_to.tasks.costs import weights
-from multimodal_to.tasks.given import com_range, given, positive, refuse_footless, speed_max
+from multimodal_to.tasks.given import given, positive, refuse_footless
 
 HEIGHT = 0.5
 """How high a robot takes off, and from where it lands, by default [ℓ]."""
@@ -190,7 +190,6 @@ def _in_air(
     more: dict[str, Any] = {}
     if robot.contacts:
         more["contacts"] = tuple(given(robot, state, float(begin), float(end)) for state, begin, end in stretches)
-    (x, y, z), (to_x, to_y, to_z) = shifts
     return Scenario(
         name=name,
         title=title,
@@ -204,7 +203,5 @@ def _in_air(
         interval_min=interval,
         interval_max=interval,
         weights=weights(robot, _units(robot)),
-        base_speed_max=speed_max(_units(robot)),
-        com_range=com_range(robot, (abs(to_x - x), abs(to_y - y), max(z, to_z))),
         **more,
     )
