@@ -28,8 +28,8 @@ from multimodal_to.scenarios.keyframes import (
     by_axis,
     contradiction,
 )
-from multimodal_to.scenarios.pushes import KnownPush
 from multimodal_to.scenarios.regions import Box, Wall
+from multimodal_to.trajectory.pushes import KnownPush
 from multimodal_to.values import FrozenMapping
 
 Vector3 = tuple[float, float, float]

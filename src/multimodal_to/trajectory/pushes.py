@@ -1,14 +1,23 @@
-"""Forces from outside that a plan knows of."""
+"""Forces from outside that a plan knows of, and that its motion is true under.
+
+A trajectory keeps them with its task.
+"""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import check_fields, checked
-from multimodal_to.errors import ScenarioError, shown
+from multimodal_to.errors import MultimodalError, ScenarioError, TrajectoryError, shown
+from multimodal_to.files.records import Records
 from multimodal_to.trajectory import rules
+from multimodal_to.trajectory.trajectory import Trajectory
 
 Vector3 = tuple[float, float, float]
 
@@ -69,3 +78,32 @@ def acting(pushes: Sequence[KnownPush], knots: int, rule: str) -> dict[tuple[int
         if some := tuple(index for index, push in enumerate(pushes) if knot in push.knots(knots, rule)):
             found.setdefault(some, []).append(knot)
     return found
+
+
+@checked
+def known_pushes(trajectory: Trajectory) -> tuple[KnownPush, ...]:
+    """Return the pushes that a trajectory was planned under, as the task that it keeps says them.
+
+    Raises:
+        TrajectoryError: what it keeps is not what a scenario writes.
+    """
+    if not trajectory.scenario_json:
+        return ()
+    try:
+        task = json.loads(trajectory.scenario_json)
+        listed = task.get("pushes", []) if isinstance(task, dict) else []
+        return tuple(_RECORDS.value(tuple[KnownPush, ...], listed, "pushes"))
+    except (ValueError, RecursionError, MultimodalError) as error:
+        raise TrajectoryError(f"the pushes kept with '{trajectory.scenario}' cannot be read: {error}") from error
+
+
+_RECORDS = Records(what="the push", error=TrajectoryError)
+
+
+@checked
+def push_forces(pushes: Sequence[KnownPush], trajectory: Trajectory) -> Array:
+    """Return the force of each push at every knot [N], (pushes, knots + 1, 3), world axes."""
+    forces = np.zeros((len(pushes), trajectory.time.size, 3))
+    for row, push in enumerate(pushes):
+        forces[row, list(push.knots(trajectory.knots, trajectory.rule))] = push.force
+    return forces
