@@ -344,6 +344,13 @@ def at_velocities(trajectory: Trajectory) -> Trajectory:
 
 
 @checked
+def outside_forces(trajectory: Trajectory) -> list[tuple[str, Array]]:
+    """Return the known pushes of the task that a trajectory keeps: the frame and its force [N], (3, knots + 1)."""
+    known = known_pushes(trajectory)
+    return [(push.of, force.T) for push, force in zip(known, push_forces(known, trajectory), strict=True)]
+
+
+@checked
 def generalised_forces(
     robot: Robot, trajectory: Trajectory, pushed: Sequence[tuple[str, Array]] | None = None
 ) -> Array:
@@ -363,10 +370,7 @@ def generalised_forces(
         pushed: forces from outside beside contacts and jets: the frame and the force in world axes [N],
             (3, knots + 1); by default the known pushes of the task that the trajectory keeps.
     """
-    if pushed is None:
-        known = known_pushes(trajectory)
-        forces = push_forces(known, trajectory)
-        pushed = [(push.of, force.T) for push, force in zip(known, forces, strict=True)]
+    pushed = outside_forces(trajectory) if pushed is None else pushed
     robot = under_conditions(robot.with_jets(trajectory.jet_names), trajectory)
     count = trajectory.time.size
     names = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
