@@ -184,8 +184,8 @@ def test_contacts_that_make_no_sense_for_a_robot_are_refused(dog, contacts, says
     ("fields", "says"),
     [
         ({"of": (), "state": ON}, "'of' is empty"),
-        ({"of": "FL", "state": ON, "begin": 0.5, "end": 0.5}, "begin < end"),
-        ({"of": "FL", "state": ON, "begin": -0.1}, "begin < end"),
+        ({"of": "FL", "state": ON, "begin": 0.5, "end": 0.5}, "expected a begin before the end"),
+        ({"of": "FL", "state": ON, "begin": -0.1}, "begin is -0.1; expected a share from 0 to 1"),
         ({"of": "FL", "state": OFF, "clearance": -1.0}, "clearance is -1.0"),
         ({"of": "FL", "state": ON, "clearance": 0.1}, "asks for a foot that is off"),
     ],

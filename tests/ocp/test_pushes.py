@@ -96,7 +96,7 @@ def test_the_doctor_warns_of_a_push_that_carries_the_robot_away_and_refuses_one_
 def test_a_push_that_is_none_is_refused():
     with pytest.raises(ScenarioError, match="three finite numbers"):
         mt.KnownPush(of="base_link", force=(0.0, 1.0, float("nan")))
-    with pytest.raises(ScenarioError, match="begin < end"):
+    with pytest.raises(ScenarioError, match="expected a begin before the end"):
         mt.KnownPush(of="base_link", force=(0.0, 1.0, 0.0), begin=0.5, end=0.5)
 
 

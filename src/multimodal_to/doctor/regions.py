@@ -10,6 +10,7 @@ from multimodal_to.doctor.task import Task
 from multimodal_to.errors import ModelError
 from multimodal_to.models.bodies import bodies_of
 from multimodal_to.ocp.regions import regions_of
+from multimodal_to.trajectory.instants import knot_at
 
 _NEAR = 1e-5
 """By how much a start may be nearer than the distance that is asked for [m]."""
@@ -24,7 +25,7 @@ def regions(task: Task) -> Iterator[Symptom]:
         except ModelError as cause:
             yield error("walls and boxes", str(cause), "name frames of the robot in 'of', or give it capsules")
             continue
-        if posture is None or round(region.begin * task.scenario.knots) > 0:
+        if posture is None or knot_at(region.begin, task.scenario.knots) > 0:
             continue
         base, joints = posture.base_transform[None], posture.joint_positions[:, None]
         free = {body.name: float(room(robot, region, body, base, joints)[0]) - region.distance for body in bodies}

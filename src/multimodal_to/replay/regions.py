@@ -12,6 +12,7 @@ from multimodal_to.replay.stage import View
 from multimodal_to.scenarios.data import OwnSurfaceError, stored
 from multimodal_to.scenarios.regions import Box, Region, Wall
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.instants import share
 
 COLOUR = 0x6C4AB6
 _OPACITY, _THICKNESS = 0.16, 0.002  # of faces [1], of a wall [m]
@@ -48,7 +49,7 @@ def draw_regions(scene: Scene, view: View, regions: tuple[Region, ...]) -> None:
         scene.add(f"{path}/edges", lines, None, pose, shadow=False)
         if scene.time.size > 1:
             rounding = 0.5 / (scene.time.size - 1)
-            holds = (shares >= region.begin - rounding) & (shares <= region.end + rounding)
+            holds = (shares >= share(region.begin) - rounding) & (shares <= share(region.end) + rounding)
             scene.set(path, "visible", holds)
 
 

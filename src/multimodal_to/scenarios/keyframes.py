@@ -13,6 +13,7 @@ from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import InputError, ScenarioError, shown, unknown
 from multimodal_to.models import attitude
 from multimodal_to.models.robot import Robot
+from multimodal_to.trajectory.instants import START, Instant, check_instant, knot_at
 from multimodal_to.values import FrozenMapping
 
 Vector3 = tuple[float, float, float]
@@ -20,7 +21,6 @@ Quaternion = tuple[float, float, float, float]
 AXES = "xyz"
 HOME = "home"
 """What stands for the CoM of home: `Robot.home_com`, on the ground below the world's origin."""
-START, END = "start", "end"
 _ROUNDING = 1e-9
 """Limits that cross by less do not contradict each other, in their units."""
 
@@ -81,7 +81,7 @@ class Keyframe:
         InputError: a number makes no sense, parts contradict each other, or nothing is asked.
     """
 
-    when: float | str | None = None
+    when: Instant | None = None
     """Share of the horizon from 0 to 1, "start" or "end" [1]; the nearest knot is taken."""
     knot: int | None = None
     """Which knot, from 0 to the number of intervals, instead of `when` [1]."""
@@ -143,9 +143,7 @@ class Keyframe:
         """Return the knot of a horizon of so many intervals."""
         if self.knot is not None:
             return self.knot
-        if isinstance(self.when, str):
-            return knots if self.when == END else 0
-        return round((self.when or 0.0) * knots)
+        return knot_at(START if self.when is None else self.when, knots)
 
     @property
     def of_home(self) -> bool:
@@ -214,10 +212,8 @@ class Keyframe:
             raise InputError("a keyframe has 'when' or 'knot'; expected one of them")
         if self.knot is not None and self.knot < 0:
             raise InputError(f"knot is {self.knot}; expected a number of at least zero")
-        if isinstance(self.when, str) and self.when not in (START, END):
-            raise InputError(f"when is {shown(self.when)}; expected a share from 0 to 1, '{START}' or '{END}'")
-        if isinstance(self.when, int | float) and not 0.0 <= self.when <= 1.0:
-            raise InputError(f"when is {self.when}; expected a share from 0 to 1, '{START}' or '{END}'")
+        if self.when is not None:
+            check_instant(self.when, "when", InputError)
 
     def _check_com(self) -> None:
         if isinstance(self.com, str):

@@ -19,9 +19,7 @@ from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitPlan
 from multimodal_to.scenarios.keyframes import (
     AXES,
-    END,
     HOME,
-    START,
     Keyframe,
     Placed,
     asked_of,
@@ -29,6 +27,7 @@ from multimodal_to.scenarios.keyframes import (
     contradiction,
 )
 from multimodal_to.scenarios.regions import Box, Wall
+from multimodal_to.trajectory.instants import END, START
 from multimodal_to.trajectory.pushes import KnownPush
 from multimodal_to.values import FrozenMapping
 

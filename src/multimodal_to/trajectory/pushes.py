@@ -17,6 +17,7 @@ from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import MultimodalError, ScenarioError, TrajectoryError, shown
 from multimodal_to.files.records import Records
 from multimodal_to.trajectory import rules
+from multimodal_to.trajectory.instants import Instant, check_stretch, knot_at
 from multimodal_to.trajectory.trajectory import Trajectory
 
 Vector3 = tuple[float, float, float]
@@ -34,21 +35,17 @@ class KnownPush:
     """The link or frame, at whose origin the force acts."""
     force: Vector3
     """The force on the robot, in world axes [N]."""
-    begin: float = 0.0
-    """Where it begins, as a share of the horizon [1]."""
-    end: float = 1.0
-    """Where it ends, as a share of the horizon [1]."""
+    begin: Instant = 0.0
+    """When it begins: a share of the horizon, "start" or "end" [1]."""
+    end: Instant = 1.0
+    """When it ends, likewise [1]."""
 
     def __post_init__(self) -> None:
         check_fields(self, ScenarioError, "pushes: ")
         if len(self.force) != 3 or not all(map(math.isfinite, self.force)):
             raise ScenarioError(f"pushes: force is {shown(self.force)}; expected three finite numbers [N]")
         object.__setattr__(self, "force", tuple(map(float, self.force)))
-        if not 0.0 <= self.begin < self.end <= 1.0:
-            raise ScenarioError(
-                f"pushes: begin is {shown(self.begin)} and end {shown(self.end)}; expected 0 <= begin < end <= 1, as "
-                "shares of the horizon"
-            )
+        check_stretch(self.begin, self.end, "pushes", ScenarioError)
 
     @checked
     def knots(self, knots: int, rule: str) -> range:
@@ -61,7 +58,7 @@ class KnownPush:
             knots: N, the number of intervals.
             rule: name of the integration rule.
         """
-        first, last = round(self.begin * knots), round(self.end * knots)
+        first, last = knot_at(self.begin, knots), knot_at(self.end, knots)
         return range(first, last) if rules.acts_after(rule) else range(first + 1, last + 1)
 
 
