@@ -318,3 +318,35 @@ def test_weight_stays_off_feet_in_the_air_between_two_hovers(hopper):
     assert guess["thrust"].sum(axis=0) == pytest.approx(np.full(31, hopper.weight))
     assert guess["com_position"][2, 15] == pytest.approx(0.7)
     assert mt.solve(problem).status.solved
+
+
+def test_the_guess_brings_a_hand_and_a_foot_to_where_keyframes_ask_for_them(ironcub):
+    """The joints are those of inverse kinematics, the foot's points go along, and the CoM stays on its way."""
+    hand, sole = mt.FrameTarget(position=(-0.33, -0.29, 0.92)), mt.FrameTarget(position={"x": -0.15, "z": 0.3})
+    reach = replace(
+        mt.scenarios.landing(),
+        knots=10,
+        initial_com=(0.0, 0.0, 0.80),
+        final_com=(0.0, 0.0, 0.80),
+        terminal=mt.Terminal.HOVER,
+        keyframes=(mt.Keyframe(when=0.5, hover=True, frames={"l_arm_jet_turbine": hand, "r_sole_1": sole}),),
+    )
+    problem = mt.build(ironcub, reach)
+    guess = problem.layout.read_horizon(problem.guess * problem.scale)
+    poses = {}
+    for knot in (0, 5):
+        base = np.eye(4)
+        base[:3, :3] = np.array(quaternion.rotation_matrix(guess["base_quaternion_xyzw"][:, knot]))
+        base[:3, 3] = guess["base_position"][:, knot]
+        joints = guess["joint_positions"][:, knot]
+        poses[knot] = {
+            name: np.array(ironcub.kindyn.forward_kinematics(name, base, joints))[:3, 3]
+            for name in (*ironcub.contact_names, "l_arm_jet_turbine")
+        }
+        com = np.array(ironcub.kindyn.CoM_position(base, joints)).ravel()
+        assert com == pytest.approx(guess["com_position"][:, knot], abs=1e-6)
+    assert poses[5]["l_arm_jet_turbine"] == pytest.approx(hand.position, abs=1e-3)
+    assert poses[5]["r_sole_1"][[0, 2]] == pytest.approx([-0.15, 0.3], abs=1e-3)
+    row = ironcub.contact_names.index("r_sole_1")
+    assert guess["contact_positions"].reshape(-1, 3, 11)[row, :, 5] == pytest.approx(poses[5]["r_sole_1"], abs=1e-3)
+    assert np.linalg.norm(poses[0]["l_arm_jet_turbine"] - hand.position) > 0.2
