@@ -204,7 +204,10 @@ def test_a_keyframe_that_makes_no_sense_is_refused(asked, sentence):
             [{"knot": 5, "rest": True}, {"knot": 5, "momentum": mt.Momentum(linear={"x": 1.0})}],
             "linear momentum x [kg m/s] at knot 5 has to be 0 and 1",
         ),
-        ([{"when": "start", "yaw": 0.1}], "keyframe 1 asks for yaw at the first knot, and a start that is 'standing'"),
+        (
+            [{"when": "start", "base_position": {"z": 0.6}}],
+            "keyframe 1 asks for base_position at the first knot, and a start that is 'standing'",
+        ),
     ],
 )
 def test_keyframes_that_contradict_each_other_are_refused(keyframes, sentence):
