@@ -20,6 +20,7 @@ from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.keyframes import Placed, attitude_at
 from multimodal_to.trajectory import rules
 
+TURN = (0.0, 0.0, 1.0, 1.0)  # by a quarter to the left
 EVERY = (
     mt.Keyframe(when=0.25, com={"z": 0.6}, com_min={"x": -0.1}, com_max={"x": 0.1}),
     mt.Keyframe(knot=30, base_position=(0.0, 0.1, 0.6), base_orientation=(0.0, 0.0, 1.0, 1.0), rest=True),
@@ -198,6 +199,21 @@ def test_a_keyframe_that_makes_no_sense_is_refused(asked, sentence):
         (
             [{"knot": 5, "hover": True}, {"knot": 5, "standing": True}],
             "keyframe 1 asks for a hover at knot 5 and keyframe 2 for standing; expected one of them",
+        ),
+        (
+            [{"knot": 5, "base_orientation": TURN}, {"knot": 5, "base_orientation": (0.0, 0.0, 0.0, 1.0)}],
+            "keyframe 1 and keyframe 2: base at knot 5 has two orientations, 1.57 rad apart",
+        ),
+        (
+            [
+                {"knot": 5, "frames": {"head": mt.FrameTarget(orientation=some)}}
+                for some in (TURN, (1.0, 0.0, 0.0, 0.0))
+            ],
+            "frame head at knot 5 has two orientations, 3.14 rad apart",
+        ),
+        (
+            [{"knot": 5, "base_orientation": TURN}, {"knot": 5, "yaw": 0.1}],
+            "keyframe 2 asks for a yaw at knot 5 and keyframe 1 for a base_orientation",
         ),
         ([{"when": "end", "standing": True}], "end asks for a hover at knot 70 and keyframe 1 for standing"),
         (

@@ -23,6 +23,8 @@ HOME = "home"
 """What stands for the CoM of home: `Robot.home_com`, on the ground below the world's origin."""
 _ROUNDING = 1e-9
 """Limits that cross by less do not contradict each other, in their units."""
+_ANGLE = 1e-6
+"""Attitudes that are less apart are the same [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -278,6 +280,31 @@ def contradiction(placed: Sequence[Placed]) -> str:
                 both = f"{label} and {one.label}" if label and label != one.label else one.label
                 return f"{both}: {what} at knot {one.knot} has to be {_said(low, high)} and {_said(lower, upper)}"
             known[one.knot, what] = max(low, lower), min(high, upper), label or one.label
+    return _turned_twice(placed)
+
+
+def _turned_twice(placed: Sequence[Placed]) -> str:
+    """Return in one sentence which two keyframes at a knot ask for attitudes that are too far apart."""
+    known = dict[tuple[int, str], tuple[Array, float, str]]()
+    yaws = {one.knot: one.label for one in placed if one.keyframe.weight is None and one.keyframe.yaw is not None}
+    for one in placed:
+        keyframe = one.keyframe
+        if keyframe.weight is not None:
+            continue
+        asked = {
+            f"frame {name}": (some.orientation, some.orientation_tolerance) for name, some in keyframe.frames.items()
+        }
+        asked["base"] = keyframe.base_orientation, keyframe.orientation_tolerance
+        if keyframe.base_orientation is not None and one.knot in yaws:
+            return f"{yaws[one.knot]} asks for a yaw at knot {one.knot} and {one.label} for a base_orientation"
+        for what, (orientation, tolerance) in asked.items():
+            if orientation is None:
+                continue
+            value = np.array(orientation)
+            before, slack, label = known.setdefault((one.knot, what), (value, tolerance, one.label))
+            angle = 2.0 * math.acos(min(abs(float(before @ value)), 1.0))
+            if angle > math.sqrt(3.0) * (slack + tolerance) + _ANGLE:
+                return f"{label} and {one.label}: {what} at knot {one.knot} has two orientations, {angle:.3g} rad apart"
     return ""
 
 
