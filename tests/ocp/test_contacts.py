@@ -225,6 +225,8 @@ def test_what_gives_way_names_what_was_given(dog):
     hop = replace(
         scenario, contacts=(given(LEGS, OFF, 0.25, 0.75), given(LEGS, ON, 0.0, 0.25)), final_com=scenario.initial_com
     )
-    relaxed = mt.relax(mt.build(dog, hop), terms=("given_off",))
+    relaxed = mt.relax(mt.build(dog, hop))
     assert relaxed.status.solved
-    assert [term.name for term in relaxed.gives_way] == ["given_off"]
+    names = [term.name for term in relaxed.gives_way]
+    assert names[0] == "given_off"
+    assert set(names) <= {"given_off", "end: CoM", "touch_down", "joint_torques"}  # and no physics
