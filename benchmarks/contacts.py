@@ -1,6 +1,6 @@
 """Contacts given against contacts found: the same tasks solved both ways, as a table in Markdown.
 
-    python benchmarks/contacts.py [walk trot jump mixed]
+    python benchmarks/contacts.py [walk trot jump mixed lean]
 
 Needs MuJoCo and the package `example-robot-data`. Seconds are processor time of the solve; iterations do not depend on
 the machine.
@@ -14,11 +14,15 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 import multimodal_to as mt
+from multimodal_to.models.contact import ContactPoint
 from multimodal_to.models.robot import Robot
 from multimodal_to.simulation import play, tracking
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
+TABLE = 0.32  # height of the table that the iRonCub leans on [m]
 HEAD = "| task | contacts | rows | iterations | seconds | objective | answer | audit | MuJoCo |"
 
 
@@ -39,6 +43,42 @@ def trot() -> Iterator[tuple[str, Robot, mt.Scenario]]:
     yield "given", robot, given
 
 
+def lean() -> Iterator[tuple[str, Robot, mt.Scenario]]:
+    """Give the iRonCub that stands on given feet and leans on a table with its hands, whose contacts are found.
+
+    Its CoM comes to rest 2 cm beyond its toes: only hands that bear load hold it. A keyframe says how high the hands
+    are; when they touch and what they bear is found. A robot has feet alone in its file, so the hands are added here.
+    """
+    robot = mt.load_robot("ironcub").with_jets(())
+    hands = {"l_arm_jet_turbine": "left hand", "r_arm_jet_turbine": "right hand"}
+    points = [ContactPoint(frame=frame, foot=hand) for frame, hand in hands.items()]
+    leaning = replace(robot, contacts=(*robot.contacts, *points), contact_reach=np.array([0.5, 0.5, 0.6]))
+    at_the_table = {frame: mt.FrameTarget(position={"z": TABLE}) for frame in hands}
+    walk_weights = mt.scenarios.walk_to_fly().weights
+    task = mt.Scenario(
+        name="lean",
+        title="Leaning on a table",
+        knots=40,
+        jets=False,
+        start=mt.Start.GIVEN,
+        terminal=mt.Terminal.FREE,
+        interval_min=0.05,
+        interval_max=0.05,
+        surface=mt.Stairs(edges=(0.1,), heights=(0.0, TABLE), direction=(-1.0, 0.0), width=0.06),
+        contacts=(mt.ContactStretch(of=("left", "right"), state=mt.ContactState.ON),),
+        keyframes=(
+            mt.Keyframe(when=0.6, frames=at_the_table),
+            mt.Keyframe(when=0.8, com={"x": -0.08, "y": 0.0}, rest=True),
+            mt.Keyframe(when="end", com={"x": -0.08, "y": 0.0}, rest=True, frames=at_the_table),
+        ),
+        margins=mt.Margins(touch_down_speed=0.1),
+        weights=replace(
+            walk_weights, base_orientation=0.0, posture=1e6, joint_velocities={"upper_body": 1e5, "legs": 1e5}
+        ),
+    )
+    yield "feet given, hands found", leaning, task
+
+
 def mixed() -> Iterator[tuple[str, Robot, mt.Scenario]]:
     """Give the trot with three feet given and one found."""
     robot = mt.load_robot("solo12")
@@ -54,7 +94,14 @@ def jump() -> Iterator[tuple[str, Robot, mt.Scenario]]:
     yield "given", robot, given
 
 
-TASKS = {"walk": walk, "trot": trot, "jump": jump, "mixed": mixed}
+TASKS = {"walk": walk, "trot": trot, "jump": jump, "mixed": mixed, "lean": lean}
+
+
+def _stand(robot: Robot) -> mt.State:
+    """Return the state in which a robot stands on its feet alone, 7 mm lower than at home."""
+    feet = replace(robot, contacts=tuple(point for point in robot.contacts if "hand" not in point.foot))
+    x, y, z = feet.home_com
+    return mt.State.at_rest(robot, mt.standing_posture(feet, mt.FlatGround(), (x, y, z - 0.007)))
 
 
 def row(task: str, contacts: str, robot: Robot, scenario: mt.Scenario) -> str:
@@ -66,7 +113,7 @@ def row(task: str, contacts: str, robot: Robot, scenario: mt.Scenario) -> str:
         robot: that moves.
         scenario: the task.
     """
-    problem = mt.build(robot, scenario)
+    problem = mt.build(robot, scenario, initial=_stand(robot) if scenario.start is mt.Start.GIVEN else None)
     began = time.process_time()
     solution = mt.solve(problem)
     seconds = time.process_time() - began

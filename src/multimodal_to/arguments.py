@@ -10,7 +10,7 @@ from dataclasses import fields
 from enum import Enum
 from functools import cache, wraps
 from numbers import Integral, Real
-from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,6 +128,8 @@ def _hints(annotated: Hashable) -> dict[str, Any]:
 
 def _fits(value: object, annotation: Any) -> bool:
     origin, inner = get_origin(annotation), get_args(annotation)
+    if origin is Literal:
+        return isinstance(value, str) and value in inner
     if origin in (Union, types.UnionType):
         return any(_fits(value, one) for one in inner)
     if annotation in (float, int, bool):
@@ -183,6 +185,8 @@ def _members(protocol: type) -> list[str]:
 
 def _said(annotation: Any) -> str:
     origin, inner = get_origin(annotation), get_args(annotation)
+    if origin is Literal:
+        return f"one of {', '.join(inner)}"
     if origin in (Union, types.UnionType):
         if any(get_origin(one) is os.PathLike for one in inner):
             return "a path"

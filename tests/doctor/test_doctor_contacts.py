@@ -75,3 +75,29 @@ def test_feet_that_stand_at_the_end_of_a_hover_are_a_warning(ironcub):
     hover = replace(mt.scenarios.take_off(), contacts=(given("left", ON),))
     (warning,) = found(ironcub, hover, Severity.WARNING)
     assert "ends in a hover, and left is on at the end" in warning
+
+
+def test_a_keyframe_on_the_way_that_the_contacts_contradict_is_named(ironcub, dog):
+    hover = replace(
+        mt.scenarios.take_off(),
+        contacts=(given("left", ON, 0.4, 0.6),),
+        keyframes=(mt.Keyframe(when=0.5, hover=True, com=(0.0, 0.0, 0.65)),),
+    )
+    (warning,) = found(ironcub, hover, Severity.WARNING)
+    assert "keyframe 1 hovers at knot 35, and left is on there" in warning
+    jump = trot(dog, gait=None, contacts=(given(LEGS, OFF, 0.4, 0.6),))
+    stands = replace(jump, keyframes=(mt.Keyframe(when=0.5, standing=True),))
+    assert any(
+        "keyframe 1 stands at knot 30, all feet are off there" in one for one in found(dog, stands, Severity.ERROR)
+    )
+
+
+def test_a_frame_that_a_keyframe_asks_to_be_where_a_box_keeps_it_out_is_an_error(dog):
+    """2 cm inside a box that it keeps 1 cm away from is 3 cm too far; outside of its stretch there is no box."""
+    box = mt.Box(lower=(0.0, 0.0, 0.2), upper=(1.0, 1.0, 0.4), of=("base_link",), distance=0.01, begin=0.4)
+    asked = mt.Keyframe(when=0.5, frames={"base_link": mt.FrameTarget(position=(0.15, 0.02, 0.23))})
+    inside = trot(dog, boxes=(box,), keyframes=(asked,))
+    (error,) = [one for one in mt.doctor(dog, inside).of(Severity.ERROR) if one.name == "keyframe 1"]
+    assert "base_link has to be at (0.15, 0.02, 0.23) m, 0.03 m beyond where" in error.found
+    earlier = replace(inside, keyframes=(replace(asked, when=0.2),))
+    assert not [one for one in mt.doctor(dog, earlier).of(Severity.ERROR) if one.name == "keyframe 1"]

@@ -202,7 +202,8 @@ BROKEN = {
         error=None,
     ),
     "contacts that run backwards": toml(
-        "based_on = 'take-off'\n[[contacts]]\nof = 'left'\nstate = 'on'\nbegin = 0.6\nend = 0.2", "begin < end"
+        "based_on = 'take-off'\n[[contacts]]\nof = 'left'\nstate = 'on'\nbegin = 0.6\nend = 0.2",
+        "expected a begin before the end",
     ),
     "an unknown gait": toml("based_on = 'take-off'\ngait = {kind = 'canter', steps = 2}", "'gait.kind' is 'canter'"),
     "a gait without steps": toml(
@@ -212,7 +213,7 @@ BROKEN = {
         "based_on = 'take-off'\n[[failures]]\njet = 'tail'", "unknown jet 'tail'", error=None
     ),
     "a jet that fails after the end": toml(
-        "based_on = 'take-off'\n[[failures]]\njet = 'left arm'\nat = 1.5", "at is 1.5", "below 1"
+        "based_on = 'take-off'\n[[failures]]\njet = 'left arm'\nat = 1.5", "at is 1.5", "a share from 0 to 1"
     ),
     "a push of two numbers": toml(
         "based_on = 'take-off'\n[[pushes]]\nof = 'chest'\nforce = [1, 2]", "'pushes[0].force'", "a list of 3"

@@ -184,8 +184,8 @@ def test_contacts_that_make_no_sense_for_a_robot_are_refused(dog, contacts, says
     ("fields", "says"),
     [
         ({"of": (), "state": ON}, "'of' is empty"),
-        ({"of": "FL", "state": ON, "begin": 0.5, "end": 0.5}, "begin < end"),
-        ({"of": "FL", "state": ON, "begin": -0.1}, "begin < end"),
+        ({"of": "FL", "state": ON, "begin": 0.5, "end": 0.5}, "expected a begin before the end"),
+        ({"of": "FL", "state": ON, "begin": -0.1}, "begin is -0.1; expected a share from 0 to 1"),
         ({"of": "FL", "state": OFF, "clearance": -1.0}, "clearance is -1.0"),
         ({"of": "FL", "state": ON, "clearance": 0.1}, "asks for a foot that is off"),
     ],
@@ -225,6 +225,8 @@ def test_what_gives_way_names_what_was_given(dog):
     hop = replace(
         scenario, contacts=(given(LEGS, OFF, 0.25, 0.75), given(LEGS, ON, 0.0, 0.25)), final_com=scenario.initial_com
     )
-    relaxed = mt.relax(mt.build(dog, hop), terms=("given_off",))
+    relaxed = mt.relax(mt.build(dog, hop))
     assert relaxed.status.solved
-    assert [term.name for term in relaxed.gives_way] == ["given_off"]
+    names = [term.name for term in relaxed.gives_way]
+    assert names[0] == "given_off"
+    assert set(names) <= {"given_off", "end: CoM", "touch_down", "joint_torques"}  # and no physics

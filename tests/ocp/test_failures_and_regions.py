@@ -175,7 +175,10 @@ def test_what_has_no_capsules_has_to_name_frames(plane):
     [
         (lambda: mt.Wall(normal=(0.0, 0.0, 0.0), offset=0.0), "a direction with a length"),
         (lambda: mt.Box(lower=(0.0, 0.0, 0.0), upper=(1.0, 0.0, 1.0)), "that rise"),
-        (lambda: mt.Box(lower=(0.0, 0.0, 0.0), upper=(1.0, 1.0, 1.0), begin=0.5, end=0.2), "begin <= end"),
+        (
+            lambda: mt.Box(lower=(0.0, 0.0, 0.0), upper=(1.0, 1.0, 1.0), begin=0.5, end=0.2),
+            "expected a begin no later than the end",
+        ),
         (lambda: mt.Wall(normal=(0.0, 0.0, 1.0), offset=0.0, distance=-0.1), "distance is -0.1"),
     ],
 )

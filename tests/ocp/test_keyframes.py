@@ -15,6 +15,7 @@ from hopper import hopper as make_hopper
 from multimodal_to.adam import quaternion
 from multimodal_to.errors import FormulationError, ScenarioError
 from multimodal_to.ocp import keyframes
+from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.outline import formulate, prepared
 from multimodal_to.ocp.variables import Layout
@@ -318,3 +319,67 @@ def test_weight_stays_off_feet_in_the_air_between_two_hovers(hopper):
     assert guess["thrust"].sum(axis=0) == pytest.approx(np.full(31, hopper.weight))
     assert guess["com_position"][2, 15] == pytest.approx(0.7)
     assert mt.solve(problem).status.solved
+
+
+def test_the_guess_brings_a_hand_and_a_foot_to_where_keyframes_ask_for_them(ironcub):
+    """The joints are those of inverse kinematics, the foot's points go along, and the CoM stays on its way."""
+    hand, sole = mt.FrameTarget(position=(-0.33, -0.29, 0.92)), mt.FrameTarget(position={"x": -0.15, "z": 0.3})
+    reach = replace(
+        mt.scenarios.landing(),
+        knots=10,
+        initial_com=(0.0, 0.0, 0.80),
+        final_com=(0.0, 0.0, 0.80),
+        terminal=mt.Terminal.HOVER,
+        keyframes=(mt.Keyframe(when=0.5, hover=True, frames={"l_arm_jet_turbine": hand, "r_sole_1": sole}),),
+    )
+    problem = mt.build(ironcub, reach)
+    guess = problem.layout.read_horizon(problem.guess * problem.scale)
+    poses = {}
+    for knot in (0, 5):
+        base = np.eye(4)
+        base[:3, :3] = np.array(quaternion.rotation_matrix(guess["base_quaternion_xyzw"][:, knot]))
+        base[:3, 3] = guess["base_position"][:, knot]
+        joints = guess["joint_positions"][:, knot]
+        poses[knot] = {
+            name: np.array(ironcub.kindyn.forward_kinematics(name, base, joints))[:3, 3]
+            for name in (*ironcub.contact_names, "l_arm_jet_turbine")
+        }
+        com = np.array(ironcub.kindyn.CoM_position(base, joints)).ravel()
+        assert com == pytest.approx(guess["com_position"][:, knot], abs=1e-6)
+    assert poses[5]["l_arm_jet_turbine"] == pytest.approx(hand.position, abs=1e-3)
+    assert poses[5]["r_sole_1"][[0, 2]] == pytest.approx([-0.15, 0.3], abs=1e-3)
+    row = ironcub.contact_names.index("r_sole_1")
+    assert guess["contact_positions"].reshape(-1, 3, 11)[row, :, 5] == pytest.approx(poses[5]["r_sole_1"], abs=1e-3)
+    assert np.linalg.norm(poses[0]["l_arm_jet_turbine"] - hand.position) > 0.2
+
+
+def test_a_standing_start_is_turned_and_bent_as_its_keyframe_asks(ironcub):
+    """The feet stand, turned with the base; a posture cost still pulls to joints that are not bent."""
+    task = replace(
+        mt.scenarios.take_off(),
+        knots=6,
+        keyframes=(mt.Keyframe(when="start", yaw=0.5, joints={"l_elbow": 1.2}),),
+    )
+    problem = mt.build(ironcub, task)
+    lower, upper = (problem.layout.read_horizon(side * problem.scale) for side in (problem.lower, problem.upper))
+    start = {name: values[:, 0] for name, values in lower.items()}
+    for name in ("base_quaternion_xyzw", "joint_positions", "contact_positions", "com_position"):
+        np.testing.assert_array_equal(start[name], upper[name][:, 0])
+    elbow = ironcub.joint_names.index("l_elbow")
+    assert start["joint_positions"][elbow] == pytest.approx(1.2)
+    assert problem.parameters.target.joint_positions[elbow] < 0.5
+    assert start["com_position"] == pytest.approx(task.initial_com)
+    points = start["contact_positions"].reshape(-1, 3)
+    assert points[:, 2] == pytest.approx(0.0, abs=2e-5)
+    flat = contact_positions(ironcub, mt.standing_posture(ironcub, mt.FlatGround(), task.initial_com)).reshape(-1, 3)
+    heading, before = (some[:4].mean(axis=0) - some[4:].mean(axis=0) for some in (points, flat))
+    turned = math.atan2(heading[1], heading[0]) - math.atan2(before[1], before[0])
+    assert turned == pytest.approx(0.5, abs=0.02)
+    assert not [name for name in problem.rows if name.startswith("keyframe 1")]
+
+
+def test_a_start_that_cannot_be_bent_so_says_why(ironcub):
+    beyond = replace(mt.scenarios.take_off(), keyframes=(mt.Keyframe(when="start", joints={"l_elbow": 3.0}),))
+    with pytest.raises(ScenarioError, match=r"l_elbow has to be 3; expected 0.26\d* to 1.83\d*, its range"):
+        mt.build(ironcub, beyond)
+    assert mt.doctor(ironcub, beyond).hopeless

@@ -17,6 +17,7 @@ from multimodal_to.models.robot import load_robot
 from multimodal_to.plotting import style
 from multimodal_to.scenarios.data import to_json
 from multimodal_to.trajectory import derived, rules
+from multimodal_to.trajectory.pushes import KnownPush
 from synthetic import DURATION, LIFT_OFF, take_off
 
 
@@ -85,6 +86,16 @@ def test_each_flight_has_its_own_band_but_one_entry_in_the_legend(robot, traject
     time = trajectory.time
     np.testing.assert_allclose(bands(figure.axes[0]), [(time[2], time[3]), (LIFT_OFF, time[-3])])
     assert [text.get_text() for text in figure.axes[2].get_legend().get_texts()].count("flight") == 1
+
+
+def test_a_known_push_has_a_band_while_it_acts(robot, trajectory):
+    push = KnownPush(of="chest", force=(0.0, 60.0, 0.0), begin=0.25, end=0.5)
+    forces = np.full_like(trajectory.contact_forces, 20.0)  # so that there is no band of flight
+    task = to_json(replace(scenarios.take_off(), pushes=(push,)))
+    figure = plotting.plot_forces(robot, replace(trajectory, contact_forces=forces, scenario_json=task))
+    for axes in figure.axes:
+        assert bands(axes) == [pytest.approx((0.25 * DURATION, 0.5 * DURATION), abs=DURATION / trajectory.knots)]
+    assert "known push" in [text.get_text() for text in figure.axes[2].get_legend().get_texts()]
 
 
 def test_bands_of_several_runs_together_leave_the_data_visible(robot, trajectory):

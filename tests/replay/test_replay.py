@@ -22,8 +22,10 @@ from multimodal_to.replay import effects, scene
 from multimodal_to.replay.bodies import link_paths, link_poses
 from multimodal_to.replay.visuals import appearance
 from multimodal_to.scenarios.data import to_json
+from multimodal_to.scenarios.regions import Box, Wall
 from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.derived import flight_force, frame_poses
+from multimodal_to.trajectory.pushes import KnownPush
 from synthetic import DURATION, KNOTS, take_off
 
 quaternion_matrix = scene.meshcat.transformations.quaternion_matrix
@@ -382,3 +384,31 @@ def test_links_are_in_their_place_whatever_they_are_called(tmp_path):
         for length in range(2, len(parts) + 1):
             world = world @ at["/".join(parts[:length])]
         np.testing.assert_allclose(world, frame_poses(robot, motion, name), atol=1e-9)
+
+
+def test_what_the_task_says_of_pushes_walls_and_boxes_is_drawn(robot, trajectory, tmp_path):
+    """An arrow ends where the push acts, while it acts; a box is seen over its stretch; a wall is in its plane."""
+    push = KnownPush(of="chest", force=(0.0, 60.0, 0.0), begin=0.25, end=0.5)
+    wall, box = Wall(normal=(0.0, -3.0, 0.0), offset=-0.8), Box(lower=(0.3, 0.0, 0.0), upper=(0.5, 0.4, 0.2), begin=0.5)
+    task = replace(scenarios.take_off(), pushes=(push,), walls=(wall,), boxes=(box,))
+    path = replay.write_html(
+        robot, replace(trajectory, scenario_json=to_json(task)), tmp_path / "task.html", meshes=False
+    )
+    text = path.read_text(encoding="utf-8")
+    shown = Stage(text)
+    assert "push from outside" in text
+    assert "wall or box of the task" in text
+    arrow, acts = shown.find("pushes/0"), list(push.knots(KNOTS, trajectory.rule))
+    at, length = frame_poses(robot, trajectory, "chest")[:, :3, 3], effects.ARROW_LENGTH * 60.0 / robot.weight
+    for knot in range(KNOTS + 1):
+        scale = shown.value(arrow, "scale", knot)[2]
+        assert scale == pytest.approx(length if knot in acts else 0.0)
+        if knot in acts:
+            end = shown.world(arrow, knot)[:3, 3] + scale * shown.world(arrow, knot)[:3, 2]
+            np.testing.assert_allclose(end, at[knot], atol=1e-6)
+    faces = {index: shown.transforms[shown.find(f"regions/{index}/faces")] for index in (0, 1)}
+    assert faces[0][:3, 2] == pytest.approx([0.0, -1.0, 0.0])
+    assert faces[0][1, 3] == pytest.approx(0.8, abs=0.002)
+    assert faces[1][:3, 3] == pytest.approx([0.4, 0.2, 0.1])
+    seen = [bool(shown.value(shown.find("regions/1"), "visible", knot)) for knot in (0, KNOTS // 4, KNOTS)]
+    assert seen == [False, False, True]

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import tomli_w
 
 import multimodal_to as mt
 from multimodal_to.errors import InputError, ScenarioError
 from multimodal_to.models.attitude import product
+from multimodal_to.ocp.schedule import Schedule
+from multimodal_to.scenarios import files as scenario_files
 from multimodal_to.scenarios.data import from_dict, to_dict, to_json
+from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.keyframes import Placed, attitude_at
+from multimodal_to.trajectory import rules
 
+TURN = (0.0, 0.0, 1.0, 1.0)  # by a quarter to the left
 EVERY = (
     mt.Keyframe(when=0.25, com={"z": 0.6}, com_min={"x": -0.1}, com_max={"x": 0.1}),
     mt.Keyframe(knot=30, base_position=(0.0, 0.1, 0.6), base_orientation=(0.0, 0.0, 1.0, 1.0), rest=True),
@@ -193,12 +200,30 @@ def test_a_keyframe_that_makes_no_sense_is_refused(asked, sentence):
             [{"knot": 5, "hover": True}, {"knot": 5, "standing": True}],
             "keyframe 1 asks for a hover at knot 5 and keyframe 2 for standing; expected one of them",
         ),
+        (
+            [{"knot": 5, "base_orientation": TURN}, {"knot": 5, "base_orientation": (0.0, 0.0, 0.0, 1.0)}],
+            "keyframe 1 and keyframe 2: base at knot 5 has two orientations, 1.57 rad apart",
+        ),
+        (
+            [
+                {"knot": 5, "frames": {"head": mt.FrameTarget(orientation=some)}}
+                for some in (TURN, (1.0, 0.0, 0.0, 0.0))
+            ],
+            "frame head at knot 5 has two orientations, 3.14 rad apart",
+        ),
+        (
+            [{"knot": 5, "base_orientation": TURN}, {"knot": 5, "yaw": 0.1}],
+            "keyframe 2 asks for a yaw at knot 5 and keyframe 1 for a base_orientation",
+        ),
         ([{"when": "end", "standing": True}], "end asks for a hover at knot 70 and keyframe 1 for standing"),
         (
             [{"knot": 5, "rest": True}, {"knot": 5, "momentum": mt.Momentum(linear={"x": 1.0})}],
             "linear momentum x [kg m/s] at knot 5 has to be 0 and 1",
         ),
-        ([{"when": "start", "yaw": 0.1}], "keyframe 1 asks for yaw at the first knot, and a start that is 'standing'"),
+        (
+            [{"when": "start", "base_position": {"z": 0.6}}],
+            "keyframe 1 asks for base_position at the first knot, and a start that is 'standing'",
+        ),
     ],
 )
 def test_keyframes_that_contradict_each_other_are_refused(keyframes, sentence):
@@ -226,3 +251,44 @@ def test_an_end_without_a_word_is_missed():
         replace(mt.scenarios.take_off(), initial_com=None)
     with pytest.raises(ScenarioError, match="final_com_shift is from home's CoM, and final_com has numbers"):
         replace(mt.scenarios.take_off(), final_com_shift=(0.0, 0.0, 0.1))
+
+
+INSTANTS = """
+based_on = "take-off"
+gait = { kind = "walk", steps = 2, begin = "start" }
+pushes = [{ of = "chest", force = [0.0, 9.0, 0.0], end = "end" }]
+walls = [{ normal = [0.0, 0.0, -1.0], offset = -2.0, begin = "start", end = "start" }]
+boxes = [{ lower = [1.0, 1.0, 0.0], upper = [2.0, 2.0, 1.0], begin = "end" }]
+failures = [{ jet = "left arm", at = "start" }]
+[[contacts]]
+of = "left"
+state = "on"
+begin = "start"
+end = "end"
+"""
+
+
+def test_every_place_that_takes_an_instant_reads_start_and_end(ironcub, tmp_path):
+    """They mean the shares 0 and 1, in a file as in Python, and a file keeps the words."""
+    (tmp_path / "words.toml").write_text(INSTANTS)
+    words = scenario_files.load(tmp_path / "words.toml")
+    (tmp_path / "shares.toml").write_text(INSTANTS.replace('"start"', "0").replace('"end"', "1"))
+    shares = scenario_files.load(tmp_path / "shares.toml")
+    np.testing.assert_array_equal(Schedule.of(ironcub, words).on, Schedule.of(ironcub, shares).on)
+    assert Schedule.of(ironcub, words).on[0, 1:].all()
+    assert words.gait.stretches(ironcub) == shares.gait.stretches(ironcub)
+    assert words.pushes[0].knots(10, rules.LEAPFROG) == shares.pushes[0].knots(10, rules.LEAPFROG) == range(10)
+    assert failing_knots(words.failures, ironcub.jet_names, 10) == {0: 0}
+    assert scenario_files.load(scenario_files.save(words, tmp_path / "again.toml")) == words
+
+
+@pytest.mark.parametrize("key", ["gait.begin", "pushes.end", "walls.begin", "boxes.end", "failures.at", "contacts.end"])
+def test_another_word_for_an_instant_is_refused_wherever_one_is_said(tmp_path, key):
+    group, name = key.split(".")
+    table = tomllib.loads(INSTANTS)
+    place = table[group] if group == "gait" else table[group][0]
+    place[name] = "middle"
+    (tmp_path / "wrong.toml").write_text(tomli_w.dumps(table))
+    at = key if group == "gait" else rf"{group}\[0\].{name}"
+    with pytest.raises(ScenarioError, match=f"'{at}' is 'middle'; expected a finite number or one of start, end"):
+        scenario_files.load(tmp_path / "wrong.toml")

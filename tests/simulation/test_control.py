@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import multimodal_to as mt
-from drones import drone
+from drones import HOP, drone
 from multimodal_to.errors import InputError
+from multimodal_to.scenarios.data import to_json
 from multimodal_to.simulation import (
     Command,
     Disturbance,
@@ -27,6 +28,7 @@ from multimodal_to.simulation import (
     tracking,
 )
 from multimodal_to.simulation.controller import Belief, drawn
+from multimodal_to.simulation.known import Known
 from multimodal_to.simulation.look_ahead import Feedback, LookAhead
 from multimodal_to.simulation.noise import Estimate, Noise
 from multimodal_to.simulation.reference import reference
@@ -148,7 +150,7 @@ def at_the_end(ironcub, take_off):
     """The hover at the end of the take-off, with its feedback."""
     plan = reference(ironcub, take_off.trajectory, np.arange(0.0, 7.0, 2e-3))
     belief = Belief(ironcub, take_off.trajectory)
-    return Feedback(belief, plan, 2e-3, LookAhead()), belief, plan
+    return Feedback(belief, plan, 2e-3, LookAhead(), Known.of(ironcub, take_off.trajectory)), belief, plan
 
 
 def advice(feedback, belief, plan, step, **off):
@@ -279,7 +281,42 @@ def test_parallel_jets_on_the_body_lean_it_to_move_aside(tmp_path):
     still = hovering(robot)
     plan = reference(robot, still, np.arange(0.0, 1.0, 2e-3))
     belief = Belief(robot, still)
-    feedback = Feedback(belief, plan, 2e-3, LookAhead())
+    feedback = Feedback(belief, plan, 2e-3, LookAhead(), Known.of(robot, still))
     left, right = advice(feedback, belief, plan, 0, place=np.array([0.0, 0.02, 0.0])).throttle
     assert robot.jet_names == ("left", "right")
     assert left > right + 0.1
+
+
+@pytest.mark.parametrize(("at", "jet"), [(0.5, "left"), (0.0, "right")])
+def test_a_jet_that_the_plan_has_fail_dies_in_the_playback_whatever_is_asked_of_it(tmp_path, at, jet):
+    """From then on its throttle is at its least and its thrust runs down; one that never lights gives none."""
+    robot = drone(tmp_path)
+    failure = replace(HOP, knots=hovering(robot).knots, failures=(mt.JetFailure(jet=jet, at=at),))
+    motion = part_of(replace(hovering(robot), scenario_json=to_json(failure)), 0.0, 0.4)
+    row, other = robot.jet_names.index(jet), 1 - robot.jet_names.index(jet)
+    played = play(robot, motion)
+    before = played.time < Known.of(robot, motion).fails[row] - 1e-6
+    assert before.any() == (at > 0.0)
+    assert (played.throttle[before, row] > 10.0).all()
+    assert (played.throttle[~before, row] == robot.jets[row].throttle_min).all()
+    assert played.throttle[~before, other].max() > 10.0
+    if at:
+        assert played.thrust[before, row].min() > 90.0
+        assert (np.diff(played.thrust[~before, row]) <= 0.0).mean() > 0.95
+        assert played.thrust[-1, row] < 0.8 * played.thrust[0, row]
+    else:
+        assert (played.thrust[1:, row] == 0.0).all()
+
+
+def test_the_feedback_asks_nothing_of_a_jet_from_when_it_has_failed(tmp_path):
+    robot = drone(tmp_path)
+    still = replace(hovering(robot), scenario_json=to_json(replace(HOP, failures=(mt.JetFailure(jet="left", at=0.5),))))
+    plan, belief = reference(robot, still, np.arange(0.0, 2.0, 2e-3)), Belief(robot, still)
+    known = Known.of(robot, still)
+    feedback = Feedback(belief, plan, 2e-3, LookAhead(), known)
+    before, after = (round((known.fails[0] + later) / 2e-3) for later in (-0.2, 0.1))
+    aside = np.array([0.0, 0.02, 0.0])
+    assert advice(feedback, belief, plan, before, place=aside).throttle.all()
+    left, right = advice(feedback, belief, plan, after, place=aside).throttle
+    assert left == 0.0
+    assert right != 0.0

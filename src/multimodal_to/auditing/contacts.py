@@ -16,6 +16,7 @@ from multimodal_to.scenarios.contacts import ContactState, ContactStretch
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.derived import surface_frames
+from multimodal_to.trajectory.instants import knot_at
 
 CONTACTS = (
     Property(
@@ -103,7 +104,7 @@ def _given(robot: Robot, scenario: Scenario, knots: int) -> list[_Given]:
         told: list[ContactStretch | None] = [None] * knots
         for stretch in (*(scenario.gait.stretches(robot) if scenario.gait else ()), *scenario.contacts):
             if contact.foot in stretch.of or contact.frame in stretch.of:
-                for interval in range(round(stretch.begin * knots), round(stretch.end * knots)):
+                for interval in range(knot_at(stretch.begin, knots), knot_at(stretch.end, knots)):
                     told[interval] = stretch
         first = 0
         for interval in range(1, knots + 1):
@@ -111,7 +112,7 @@ def _given(robot: Robot, scenario: Scenario, knots: int) -> list[_Given]:
             if interval < knots and told[interval] is before:
                 continue
             if before is not None and before.state is not ContactState.FREE:
-                whole = (first, interval) == (round(before.begin * knots), round(before.end * knots))
+                whole = (first, interval) == (knot_at(before.begin, knots), knot_at(before.end, knots))
                 found.append(
                     _Given(
                         point=point,

@@ -9,9 +9,9 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
-from multimodal_to.scenarios.pushes import KnownPush
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import base_poses, contact_points, frame_poses, thrust_forces
+from multimodal_to.trajectory.pushes import KnownPush, push_forces
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,9 +65,6 @@ class Motion:
             known: what pushes it from outside.
         """
         count = trajectory.time.size
-        pushes = np.zeros((len(known), count, 3))
-        for row, push in enumerate(known):
-            pushes[row, list(push.knots(trajectory.knots, trajectory.rule))] = push.force
         push_points = [frame_poses(robot, trajectory, push.of)[:, :3, 3] for push in known]
         thrust_points, thrusts = thrust_forces(robot, trajectory)
         return cls(
@@ -79,7 +76,7 @@ class Motion:
             thrusts=thrusts,
             pushed_frames=tuple(push.of for push in known),
             push_points=np.array(push_points).reshape(-1, count, 3),
-            pushes=pushes,
+            pushes=push_forces(known, trajectory),
         )
 
     @property

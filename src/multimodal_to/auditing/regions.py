@@ -12,6 +12,7 @@ from multimodal_to.models.capsule import Capsule
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.regions import Box, Region, Wall
 from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.trajectory.instants import knot_at
 
 REGIONS = (
     Property(
@@ -33,7 +34,7 @@ def region_findings(motion: Motion, scenario: Scenario) -> list[Worst]:
         return []
     trajectory, rows, names = motion.trajectory, list[Array](), list[str]()
     for region in regions:
-        first, last = round(region.begin * trajectory.knots), round(region.end * trajectory.knots)
+        first, last = (knot_at(when, trajectory.knots) for when in (region.begin, region.end))
         for body in bodies_of(motion.robot, region.of):
             row = np.full(trajectory.knots + 1, -np.inf)
             within = slice(first, last + 1)

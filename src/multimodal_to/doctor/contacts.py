@@ -28,6 +28,7 @@ def contacts(task: Task) -> Iterator[Symptom]:
         return
     yield from _start(task, schedule)
     yield from _end(task, schedule)
+    yield from _on_the_way(task, schedule)
     yield from _flights(task, schedule)
     yield from _swings(task, schedule)
 
@@ -56,6 +57,23 @@ def _end(task: Task, schedule: Schedule) -> Iterator[Symptom]:
             f"the motion ends in a hover, and {_said(task, on)} on at the end: on the ground, without any force",
             "let the stretch end before, or end standing",
         )
+
+
+def _on_the_way(task: Task, schedule: Schedule) -> Iterator[Symptom]:
+    """Compare keyframes between the ends that hover or stand with the contacts that are given at their knots."""
+    for one in task.scenario.keyframes_between():
+        if one.keyframe.hover and (on := schedule.stands[:, one.knot]).any():
+            yield warning(
+                _NAME,
+                f"{one.label} hovers at knot {one.knot}, and {_said(task, on)} on there, where no force may act",
+                "let the stretch end before the keyframe, or ask for standing",
+            )
+        if one.keyframe.standing and schedule.in_air[one.knot] and not task.lifts:
+            yield error(
+                _NAME,
+                f"{one.label} stands at knot {one.knot}, all feet are off there, and nothing else carries the weight",
+                "let a foot be on there, or place the keyframe elsewhere",
+            )
 
 
 def _flights(task: Task, schedule: Schedule) -> Iterator[Symptom]:

@@ -13,7 +13,7 @@ from multimodal_to.doctor.ground import height, hold
 from multimodal_to.doctor.hover import trim
 from multimodal_to.doctor.pushes import pushes
 from multimodal_to.doctor.reach import reach
-from multimodal_to.doctor.regions import regions
+from multimodal_to.doctor.regions import regions, targets
 from multimodal_to.doctor.task import Task
 from multimodal_to.doctor.thrust import failures, spool_up_time, weight
 from multimodal_to.doctor.travel import leap, push, speed
@@ -48,6 +48,7 @@ CHECKS: tuple[Check, ...] = (
     keyframes.yaw_without_moment,
     contacts,
     regions,
+    targets,
     pushes,
 )
 """What is asked of every task."""

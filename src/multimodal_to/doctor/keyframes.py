@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import casadi as cs
 import numpy as np
 
-from multimodal_to.adam import centroidal, quaternion
-from multimodal_to.adam.kinematics import Pose, forward_kinematics
 from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.tree import BASE
 from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
@@ -20,8 +18,9 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.ocp import paper
 from multimodal_to.ocp.guess import standing_posture
+from multimodal_to.ocp.reaching import reached
 from multimodal_to.ocp.waypoints import com as com_path
-from multimodal_to.scenarios.keyframes import AXES, Placed, attitude_at, by_axis
+from multimodal_to.scenarios.keyframes import Placed, attitude_at, by_axis
 
 _MISSED = 1e-3
 """A frame that a search brings no nearer than this to where it is asked to be counts as out of reach [m]."""
@@ -156,8 +155,8 @@ def frames(task: Task) -> Iterator[Symptom]:
                         "ask for a nearer point, or for another CoM",
                     )
                     return
-        missed = _nearest(task, one, targets)
-        for name, distance in missed.items():
+        found = reached(task.robot, one, com_path(task.scenario)[:, one.knot], task.robot.home, still=False)
+        for name, distance in (found.missed if found else {}).items():
             if distance > _MISSED + one.keyframe.frames[name].position_tolerance:
                 where = "with the CoM where it is asked to be, " if com else ""
                 yield warning(
@@ -181,58 +180,6 @@ def _extent(robot: Robot, frame: str) -> float:
         return sum(steps) + float(cs.norm_2(place.translation))
 
     return along(frame) + max(along(name) for name in tree.frames)
-
-
-def _nearest(task: Task, one: Placed, targets: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
-    """Return how far frames stay from where they are asked to be [m], in the posture that brings them nearest.
-
-    Base and joints are free within their ranges, but for the attitude of a hover, joints that are asked for, and the
-    CoM. The search is a local one, from home.
-
-    Args:
-        task: robot and scenario.
-        one: the keyframe.
-        targets: positions by frame and axis.
-    """
-    robot, keyframe = task.robot, one.keyframe
-    tree, limits, count = robot.kindyn.tree, robot.joint_limits, len(robot.joint_names)
-    position, tilt, s = cs.SX.sym("p", 3), cs.SX.sym("tilt", 3), cs.SX.sym("s", count)
-    attitude = attitude_at(robot, [one], one.knot)
-    base = Pose(quaternion.rotation_matrix(quaternion.product(quaternion.exp(tilt), cs.DM(attitude))), position)
-    off = {}
-    for name, asked in targets.items():
-        there = forward_kinematics(tree, tree.frame(name), base, s).translation
-        off[name] = cs.vertcat(*(there[AXES.index(axis)] - value for axis, value in asked.items()))
-    com = by_axis(None if isinstance(keyframe.com, str) else keyframe.com)
-    there = centroidal.com_position(tree, base, s)
-    lower, upper = limits.lower.copy(), limits.upper.copy()
-    for name, value in keyframe.joints.items():
-        index = robot.joint_names.index(name)
-        lower[index] = np.clip(value - keyframe.joint_tolerance, lower[index], upper[index])
-        upper[index] = np.clip(value + keyframe.joint_tolerance, lower[index], upper[index])
-    free = 0.0 if keyframe.hover or keyframe.yaw is not None or keyframe.base_orientation is not None else 0.5
-    near = cs.sumsqr(s - robot.home.joint_positions) + cs.sumsqr(tilt)
-    problem = {
-        "x": cs.vertcat(position, tilt, s),
-        "f": 1e4 * sum(cs.sumsqr(some) for some in off.values()) + 1e-3 * near,
-        "g": cs.vertcat(cs.SX(0, 1), *(there[AXES.index(axis)] - value for axis, value in com.items())),
-    }
-    options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-8}}
-    solver = cs.nlpsol("nearest", "ipopt", problem, options)
-    path = com_path(task.scenario)[:, one.knot]
-    start = robot.home.base_position + path - robot.com_at(robot.home)
-    answer = solver(
-        x0=np.concatenate([start, np.zeros(3), np.clip(robot.home.joint_positions, lower, upper)]),
-        lbx=np.concatenate([np.full(3, -np.inf), np.full(3, -free), lower]),
-        ubx=np.concatenate([np.full(3, np.inf), np.full(3, free), upper]),
-        lbg=0.0,
-        ubg=0.0,
-    )
-    if not solver.stats()["success"]:
-        return {}
-    distances = cs.Function("distances", [problem["x"]], [cs.norm_2(some) for some in off.values()])
-    found = distances.call([answer["x"]])
-    return {name: float(value) for name, value in zip(off, found, strict=True)}
 
 
 def yaw_without_moment(task: Task) -> Iterator[Symptom]:

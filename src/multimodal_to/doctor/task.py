@@ -15,7 +15,7 @@ from multimodal_to.models.terrain import FlatGround, Plane
 from multimodal_to.models.turbines import greatest_held
 from multimodal_to.ocp import given, paper, rebinding
 from multimodal_to.ocp.formulation import Formulation
-from multimodal_to.ocp.guess import standing_posture
+from multimodal_to.ocp.guess import standing_posture, starting_posture
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import Constraint
 from multimodal_to.ocp.waypoints import com as com_path
@@ -140,12 +140,22 @@ class Task:
     @cached_property
     def start_posture(self) -> Posture | None:
         """Return the posture in which the motion starts on its feet, if it does and there is one."""
-        return self._standing(self.scenario.start_com) if self.stands_at_start else None
+        if not self.stands_at_start:
+            return None
+        try:
+            return starting_posture(self.robot, self.scenario)
+        except ScenarioError:
+            return None
 
     @cached_property
     def end_posture(self) -> Posture | None:
         """Return a posture in which the motion can end on its feet, if it has to and one is found."""
-        return self._standing(self.scenario.end_com) if self.stands_at_end else None
+        if not self.stands_at_end:
+            return None
+        try:
+            return standing_posture(self.robot, self.scenario.surface, self.scenario.end_com)
+        except ScenarioError:
+            return None
 
     @property
     def posture(self) -> Posture:
@@ -165,9 +175,3 @@ class Task:
     def rigid(self) -> bool:
         """Return whether no joint can move."""
         return not np.any(self.robot.joint_limits.lower < self.robot.joint_limits.upper)
-
-    def _standing(self, com: Vector3) -> Posture | None:
-        try:
-            return standing_posture(self.robot, self.scenario.surface, com)
-        except ScenarioError:
-            return None

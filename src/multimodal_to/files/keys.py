@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from enum import Enum
 from itertools import pairwise
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from multimodal_to.errors import InputError
 from multimodal_to.files.records import Unions, members_of
@@ -133,6 +133,8 @@ def _kind(kind: Any, unions: Unions) -> str:
         return f"list of {several}" if members[-1] is Ellipsis else f"{_COUNTS[len(members)]} {several}"
     if get_origin(kind) is Mapping:
         return f"table of names, each with a {_kind(get_args(kind)[1], unions)}"
+    if get_origin(kind) is Literal:
+        return f"one of {', '.join(get_args(kind))}"
     if issubclass(kind, Enum):
         return f"one of {', '.join(member.value for member in kind)}"
     return {float: "number", int: "whole number", bool: "true or false", str: "text"}[kind]

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from enum import Enum
 from types import UnionType
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from multimodal_to.errors import InputError, MultimodalError, shown, unknown
 from multimodal_to.files.reading import is_number
@@ -128,7 +128,7 @@ class Records:
         kinds = members_of(kind)
         kind = next((some for some in kinds if _takes(some, value)), None) if len(kinds) > 1 else kinds[0]
         if kind is None:
-            raise self._wrong(key, value, " or ".join(_WORDS[get_origin(some) or some] for some in kinds))
+            raise self._wrong(key, value, " or ".join(_said(some) for some in kinds))
         if kind in self.unions:
             return self._one_of(self.unions[kind], value, key, base)
         if is_dataclass(kind):
@@ -146,10 +146,10 @@ class Records:
                     made[name] = self.value(inner, entry, f"{key}.{name}", None)
             self._refuse(faults)
             return made
-        if issubclass(kind, Enum):
-            members = {member.value: member for member in kind}
+        if get_origin(kind) is Literal or issubclass(kind, Enum):
+            members = {word: word for word in get_args(kind)} or {member.value: member for member in kind}
             if not isinstance(value, str) or value not in members:
-                raise self._wrong(key, value, f"one of {', '.join(members)}")
+                raise self._wrong(key, value, " or ".join(_said(some) for some in kinds))
             return members[value]
         return self._scalar(kind, value, key)
 
@@ -201,9 +201,18 @@ def _default_of(entry: Field[Any]) -> Any:
 
 def members_of(kind: Any) -> tuple[Any, ...]:
     """Return the types that a field's value may have, but for None."""
-    if isinstance(kind, UnionType):
+    if get_origin(kind) in (Union, UnionType):
         return tuple(member for member in get_args(kind) if member is not type(None))
     return (kind,)
+
+
+def _said(kind: Any) -> str:
+    """Return what a member of a type is in a file."""
+    if get_origin(kind) is Literal:
+        return f"one of {', '.join(get_args(kind))}"
+    if isinstance(kind, type) and issubclass(kind, Enum):
+        return f"one of {', '.join(member.value for member in kind)}"
+    return _WORDS[get_origin(kind) or kind]
 
 
 _WORDS = {tuple: "a list", Mapping: "a table", str: "a text", float: "a finite number"}
@@ -214,4 +223,4 @@ def _takes(kind: Any, value: Any) -> bool:
     """Return whether a value of a file is meant to be of one of a field's several types."""
     form = get_origin(kind) or kind
     given = {list: tuple, tuple: tuple, str: str, int: float, float: float}.get(type(value))
-    return form is given or (form is Mapping and isinstance(value, Mapping))
+    return form is given or (form is Literal and given is str) or (form is Mapping and isinstance(value, Mapping))

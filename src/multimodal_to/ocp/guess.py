@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import casadi as cs
 import numpy as np
@@ -11,8 +12,8 @@ from multimodal_to.adam import centroidal, quaternion
 from multimodal_to.adam.kinematics import Pose, forward_kinematics
 from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
-from multimodal_to.errors import ScenarioError
-from multimodal_to.models.attitude import signed_like
+from multimodal_to.errors import ScenarioError, unknown
+from multimodal_to.models.attitude import product, signed_like
 from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.terrain import Surface, heights_below
 from multimodal_to.models.units import ONE, Sized
@@ -40,39 +41,81 @@ LANDED = 0.3
 
 
 @checked
-def standing_posture(robot: Robot, surface: Surface, com: Vector3) -> Posture:
+def standing_posture(
+    robot: Robot, surface: Surface, com: Vector3, *, yaw: float = 0.0, joints: Mapping[str, float] | None = None
+) -> Posture:
     """Return the posture nearest to home with every contact point on the ground and the CoM at `com` [m].
 
     Near home are the joints and, seen from the CoM, the places of the feet: a robot that sinks keeps them there.
 
-    The base keeps its home orientation; only where no posture stands so, on a slope that the ankles cannot follow, does
-    it tilt, as little as the joints' way from home makes worth it. Least squares, solved by IPOPT.
+    The base keeps its home orientation, turned by the yaw. Only where no posture stands so, on a slope that the ankles
+    cannot follow, does it tilt, as little as the joints' way from home makes worth it. Least squares, solved by IPOPT.
 
     Args:
         robot: that stands.
         surface: the ground.
         com: where the CoM has to be, in the world [m].
+        yaw: turn about the vertical from home's heading, to the left [rad].
+        joints: positions that joints have to have, by name [rad or m].
 
     Raises:
-        ScenarioError: no posture within the joint limits does that.
+        ScenarioError: no posture within the joint limits does that, or there is no joint of a name.
     """
+    home, lower, upper = _turned(robot, yaw), robot.joint_limits.lower.copy(), robot.joint_limits.upper.copy()
+    for name, value in (joints or {}).items():
+        if name not in robot.joint_names:
+            raise ScenarioError(unknown("joint", name, robot.joint_names))
+        index = robot.joint_names.index(name)
+        if not lower[index] <= value <= upper[index]:
+            raise ScenarioError(f"{name} has to be {value:g}; expected {lower[index]:g} to {upper[index]:g}, its range")
+        lower[index] = upper[index] = value
     for tilt in (0.0, _TILT_MAX):
-        posture = _nearest_posture(robot, surface, np.array(com), tilt)
+        posture = _nearest_posture(robot, surface, np.array(com), tilt, home, (lower, upper))
         if posture is not None:
             return posture
+    as_asked = ", turned and with its joints as asked" if yaw or joints else ""
     raise ScenarioError(
-        f"no posture of {robot.name} within its joint limits stands on the ground with its CoM at {com} m; "
+        f"no posture of {robot.name} within its joint limits stands on the ground with its CoM at {com} m{as_asked}; "
         "choose another CoM to stand with"
     )
 
 
-def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float) -> Posture | None:
+def starting_posture(robot: Robot, scenario: Scenario) -> Posture:
+    """Return the posture in which a motion that starts on its feet starts, turned and bent as its keyframes ask.
+
+    Raises:
+        ScenarioError: there is none.
+    """
+    yaw, joints = 0.0, dict[str, float]()
+    for keyframe in scenario.held_at(0):
+        yaw = yaw if keyframe.yaw is None else keyframe.yaw
+        joints |= keyframe.joints
+    return standing_posture(robot, scenario.surface, scenario.start_com, yaw=yaw, joints=joints)
+
+
+def _turned(robot: Robot, yaw: float) -> Posture:
+    """Return home turned about the vertical through the base by a yaw [rad]."""
+    turn = np.append(np.sin(0.5 * yaw) * robot.up, np.cos(0.5 * yaw))
+    return replace(robot.home, base_quaternion_xyzw=product(turn, robot.home.base_quaternion_xyzw))
+
+
+def _nearest_posture(
+    robot: Robot, surface: Surface, com: Array, tilt_max: float, home: Posture, within: tuple[Array, Array]
+) -> Posture | None:
     """Return the standing posture with the base turned from home by at most `tilt_max` [rad] about each axis, if any.
 
     Variables: position of the base, its rotation vector from home in world axes, joints. The search is a local one, and
     the feet's places may lead it astray; where they do, it starts again from a posture that leaves them out.
+
+    Args:
+        robot: that stands.
+        surface: the ground.
+        com: where the CoM has to be, in the world [m], (3,).
+        tilt_max: how far the base may turn [rad].
+        home: the posture to be near to.
+        within: least and greatest joint positions, (n,) each.
     """
-    tree, home, limits, count = robot.kindyn.tree, robot.home, robot.joint_limits, len(robot.joint_names)
+    tree, count, (lower, upper) = robot.kindyn.tree, len(robot.joint_names), within
     length = ONE.of("m", robot.units)  # what the solver takes for one
     scaled_position, tilt, joints = cs.SX.sym("p", 3), cs.SX.sym("tilt", 3), cs.SX.sym("s", count)
     position = length * scaled_position
@@ -99,14 +142,15 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
         result = solver(
             x0=start,
             p=places_weight,
-            lbx=np.concatenate([np.full(3, -np.inf), np.full(3, -tilt_max), limits.lower]),
-            ubx=np.concatenate([np.full(3, np.inf), np.full(3, tilt_max), limits.upper]),
+            lbx=np.concatenate([np.full(3, -np.inf), np.full(3, -tilt_max), lower]),
+            ubx=np.concatenate([np.full(3, np.inf), np.full(3, tilt_max), upper]),
             lbg=np.concatenate([com, np.zeros(len(heights))]) / length,
             ubg=np.concatenate([com, np.full(len(heights), _CONTACT_TOLERANCE.of(robot.units))]) / length,
         )
         return np.array(result["x"]).ravel() if solver.stats()["success"] else None
 
-    lifted = np.concatenate([(home.base_position + com - at_home) / length, np.zeros(3), home.joint_positions])
+    start = np.clip(home.joint_positions, lower, upper)
+    lifted = np.concatenate([(home.base_position + com - at_home) / length, np.zeros(3), start])
     values = searched(lifted, PLACES_WEIGHT)
     if values is None:
         values = searched(lifted, 0.0)
@@ -118,7 +162,7 @@ def _nearest_posture(robot: Robot, surface: Surface, com: Array, tilt_max: float
     return Posture(
         base_position=length * values[:3],
         base_quaternion_xyzw=np.array(turned).ravel(),
-        joint_positions=np.clip(values[6:], limits.lower, limits.upper),
+        joint_positions=np.clip(values[6:], lower, upper),
     )
 
 

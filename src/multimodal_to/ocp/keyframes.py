@@ -194,6 +194,11 @@ class _Asking:
     def _name(self, what: str) -> str:
         return f"{self.one.label}: {what}"
 
+    @property
+    def is_start(self) -> bool:
+        """Return whether the posture at the knot is the one that the motion starts standing in."""
+        return not self.one.knot and self.scenario.start is Start.STANDING and self.one.keyframe.weight is None
+
     def com(self) -> Iterator[Term]:
         """Return the terms of the CoM; at the start it is a bound of its own."""
         keyframe = self.one.keyframe
@@ -211,7 +216,7 @@ class _Asking:
         keyframe = self.one.keyframe
         if position := by_axis(keyframe.base_position):
             yield self.term("base position", partial(off_base_position, asked=position), "m", tuple(position))
-        if keyframe.hover:
+        if keyframe.hover or self.is_start:
             return
         tolerance = keyframe.orientation_tolerance
         if keyframe.base_orientation is not None:
@@ -223,7 +228,7 @@ class _Asking:
     def joints(self) -> Iterator[Term]:
         """Return the term of joints."""
         asked = self.one.keyframe.joints
-        if asked:
+        if asked and not self.is_start:
             units = joint_units(self.robot, "rad")
             own = tuple(units[self.robot.joint_names.index(name)] for name in asked)
             tolerance = self.one.keyframe.joint_tolerance

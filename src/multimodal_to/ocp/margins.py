@@ -25,7 +25,7 @@ from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.self_collision import link_distances, link_pair_labels
 from multimodal_to.ocp.terms import Constraint, JointUnits, Where, at_least, between
-from multimodal_to.scenarios.pushes import KnownPush
+from multimodal_to.trajectory.pushes import KnownPush
 
 
 def generalised_forces(interval: Interval, pushed: Sequence[KnownPush] = ()) -> SX:

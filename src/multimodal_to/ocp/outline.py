@@ -10,7 +10,7 @@ from multimodal_to.models.robot import Posture, Robot
 from multimodal_to.models.state import State
 from multimodal_to.ocp import given, keyframes
 from multimodal_to.ocp.formulation import Formulation
-from multimodal_to.ocp.guess import standing_posture
+from multimodal_to.ocp.guess import standing_posture, starting_posture
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.stages import Held, NamedStage, collect
 from multimodal_to.ocp.variables import Bounds, Layout, ranges
@@ -137,7 +137,7 @@ def prepared(robot: Robot, scenario: Scenario) -> tuple[Robot, Posture]:
 def _standing(robot: Robot, scenario: Scenario) -> Posture:
     """Return the posture in which the robot stands where the motion starts or, if in the air, ends; else upright."""
     if scenario.start is Start.STANDING:
-        return standing_posture(robot, scenario.surface, scenario.start_com)
+        return starting_posture(robot, scenario)
     if scenario.terminal is Terminal.STANDING:
         return standing_posture(robot, scenario.surface, scenario.end_com)
     return robot.upright
@@ -146,10 +146,13 @@ def _standing(robot: Robot, scenario: Scenario) -> Posture:
 def _target(robot: Robot, scenario: Scenario, standing: Posture) -> Posture:
     """Return the posture that posture costs pull to: where a motion ends standing elsewhere, that of the end.
 
+    Joints that a keyframe bends at the start are not bent in it.
+
     An end at which no posture is found is no error here: a solver may find one, or say what gives way.
     """
     stands = scenario.start is Start.STANDING and scenario.terminal is Terminal.STANDING
-    if stands and scenario.start_com != scenario.end_com:
+    bent = scenario.start is Start.STANDING and any(keyframe.joints for keyframe in scenario.held_at(0))
+    if bent or (stands and scenario.start_com != scenario.end_com):
         with suppress(ScenarioError):
-            return standing_posture(robot, scenario.surface, scenario.end_com)
+            return standing_posture(robot, scenario.surface, scenario.end_com if stands else scenario.start_com)
     return standing

@@ -10,8 +10,8 @@ from multimodal_to.ocp import constraints
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.schedule import Flags
-from multimodal_to.scenarios.pushes import KnownPush, acting
 from multimodal_to.trajectory import rules
+from multimodal_to.trajectory.pushes import KnownPush, acting
 
 
 def groups(parameters: Parameters) -> list[tuple[tuple[KnownPush, ...], Flags]]:

@@ -16,6 +16,7 @@ from multimodal_to.ocp.schedule import Flags
 from multimodal_to.ocp.terms import Constraint, at_least
 from multimodal_to.scenarios.regions import Box, Region, Wall
 from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.trajectory.instants import knot_at
 
 _ROUND = 0.005
 """Over how much the edges of a box that is kept out of are rounded off, outwards [L]."""
@@ -84,7 +85,7 @@ def _within(parameters: Parameters) -> Flags:
     scenario, rows = parameters.scenario, list[np.ndarray]()
     knots = np.arange(scenario.knots + 1)
     for region in regions_of(scenario):
-        first, last = round(region.begin * scenario.knots), round(region.end * scenario.knots)
+        first, last = (knot_at(when, scenario.knots) for when in (region.begin, region.end))
         count = sum(len(_balls(region, body)[0]) for body in bodies_of(parameters.robot, region.of))
         rows += [(knots >= first) & (knots <= last)] * (count * _count(region))
     return np.array(rows, dtype=bool).reshape(-1, knots.size)

@@ -14,6 +14,7 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.contacts import ContactState, ContactStretch
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import rules
+from multimodal_to.trajectory.instants import knot_at, share
 from multimodal_to.values import Value
 
 Flags = NDArray[np.bool_]
@@ -97,7 +98,7 @@ def knots_of(stretch: ContactStretch, knots: int) -> tuple[int, int]:
     Raises:
         ScenarioError: both are the same knot.
     """
-    first, last = round(stretch.begin * knots), round(stretch.end * knots)
+    first, last = knot_at(stretch.begin, knots), knot_at(stretch.end, knots)
     if first == last:
         raise ScenarioError(
             f"contacts: {_said(stretch)} is shorter than an interval, with {knots} knots; expected a longer stretch or "
@@ -143,7 +144,7 @@ def points_of(robot: Robot, stretch: ContactStretch) -> list[int]:
 
 
 def _said(stretch: ContactStretch) -> str:
-    return f"{' and '.join(stretch.of)} '{stretch.state.value}' from {stretch.begin:g} to {stretch.end:g}"
+    return f"{' and '.join(stretch.of)} '{stretch.state.value}' from {share(stretch.begin):g} to {share(stretch.end):g}"
 
 
 def _by_end(intervals: Flags) -> Flags:

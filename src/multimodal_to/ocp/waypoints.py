@@ -10,8 +10,9 @@ import numpy as np
 from multimodal_to.adam import quaternion
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models import attitude
-from multimodal_to.models.robot import Robot
-from multimodal_to.scenarios.keyframes import AXES, Keyframe, by_axis
+from multimodal_to.models.robot import Posture, Robot
+from multimodal_to.ocp.reaching import Reached, reached
+from multimodal_to.scenarios.keyframes import AXES, Keyframe, Placed, by_axis
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 
 
@@ -84,10 +85,14 @@ def pose(robot: Robot, scenario: Scenario, view: Mapping[str, Array], points: Ar
         points: of contact [m], (contacts, 3, N + 1).
     """
     own = [one for one in scenario.own_keyframes() if one.knot or scenario.start is Start.HOVER]
+    reaching = _reaching(robot, own, view)
     for index, name in enumerate(robot.joint_names):
+        first = view["joint_positions"][index, 0]
+        back = {scenario.knots: first} if reaching else {}  # frames are let go again
+        reach = {knot: found.posture.joint_positions[index] for knot, found in reaching.items()}
         asked = {one.knot: one.keyframe.joints[name] for one in own if name in one.keyframe.joints}
-        if asked:
-            view["joint_positions"][index] = _between({0: view["joint_positions"][index, 0], **asked}, scenario.knots)
+        if reach or asked:
+            view["joint_positions"][index] = _between({0: first, **back, **reach, **asked}, scenario.knots)
     turned = {one.knot: _attitude(robot, one.keyframe) for one in own}
     asked_attitudes = {knot: value for knot, value in turned.items() if value is not None}
     if asked_attitudes:
@@ -99,9 +104,53 @@ def pose(robot: Robot, scenario: Scenario, view: Mapping[str, Array], points: Ar
             rotation = np.array(quaternion.rotation_matrix(cs.DM(turn)))
             arm = (points[:, :, knot] - about[:, knot]) @ rotation.T
             points[:, :, knot] = about[:, knot] + arm
-    if asked_attitudes or any(one.keyframe.joints for one in own):
+    if reaching or asked_attitudes or any(one.keyframe.joints for one in own):
         _keep_com(robot, view)
+    for one in own:
+        if one.knot in reaching:
+            _carry(robot, one, reaching[one.knot].posture, points)
     return points
+
+
+def _reaching(robot: Robot, own: Sequence[Placed], view: Mapping[str, Array]) -> dict[int, Reached]:
+    """Return the postures that bring frames to where keyframes ask for them, by knot.
+
+    Args:
+        robot: whose guess it is.
+        own: the keyframes.
+        view: the variables by name, with one posture all along.
+    """
+    found = dict[int, Reached]()
+    for one in own:
+        if not any(target.position for target in one.keyframe.frames.values()):
+            continue
+        near = Posture(
+            base_position=view["base_position"][:, one.knot],
+            base_quaternion_xyzw=view["base_quaternion_xyzw"][:, one.knot],
+            joint_positions=view["joint_positions"][:, one.knot],
+        )
+        posture = reached(robot, one, view["com_position"][:, one.knot], near, still=True)
+        if posture is not None:
+            found[one.knot] = posture
+    return found
+
+
+def _carry(robot: Robot, one: Placed, posture: Posture, points: Array) -> None:
+    """Bring the contact points of frames that are asked for along, in place: there and back on straight lines.
+
+    Args:
+        robot: whose guess it is.
+        one: the keyframe.
+        posture: in which its frames are where it asks for them.
+        points: of contact [m], (contacts, 3, N + 1).
+    """
+    tree, last = robot.kindyn.tree, points.shape[2] - 1
+    bodies = {tree.frame(name).body for name, target in one.keyframe.frames.items() if target.position}
+    for index, name in enumerate(robot.contact_names):
+        if tree.frame(name).body in bodies:
+            pose = robot.kindyn.forward_kinematics(name, posture.base_transform, posture.joint_positions)
+            moved = np.array(pose)[:3, 3] - points[index, :, one.knot]
+            points[index] += moved[:, None] * _between({0: 0.0, last: 0.0, one.knot: 1.0}, last)
 
 
 def _attitude(robot: Robot, keyframe: Keyframe) -> Array | None:

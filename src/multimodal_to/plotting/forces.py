@@ -16,6 +16,7 @@ from multimodal_to.plotting.style import (
     draw_flight,
     draw_limits,
     draw_lines,
+    draw_pushes,
     draw_row,
     finish,
     legend_above,
@@ -30,8 +31,9 @@ from multimodal_to.trajectory.derived import vertical_thrust
 def plot_forces(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] | None = None) -> Figure:
     """Plot throttle [%], thrust [N] and total vertical contact force [N] over time, one panel each.
 
-    Flight (`derived.flight_force`) is a translucent red band; limits are dashed; beside the contact force stand the
-    weight m g and the vertical sum of the thrusts, which takes it over from the ground. Legends stand above the panels.
+    Flight (`derived.flight_force`) is a translucent red band, a known push a purple one. Limits are dashed. Beside the
+    contact force stand the weight m g and the vertical sum of the thrusts, which takes it over from the ground. Legends
+    stand above the panels.
 
     Raises:
         InputError: the trajectories are for different robots, or too many.
@@ -55,6 +57,7 @@ def plot_forces(robot: Robot, *trajectories: Trajectory, labels: Sequence[str] |
 
     panels = (throttle, thrust, force)
     draw_flight(panels, runs, labelled=force)
+    draw_pushes(panels, runs, labelled=force)
     finish(panels)
     for axes in panels:
         legend_above(axes)

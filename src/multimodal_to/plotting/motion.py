@@ -9,7 +9,16 @@ from matplotlib.figure import Figure
 from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
 from multimodal_to.plotting.lettering import lettered
-from multimodal_to.plotting.style import Run, draw_flight, draw_lines, finish, legend_above, new_figure, runs_of
+from multimodal_to.plotting.style import (
+    Run,
+    draw_flight,
+    draw_lines,
+    draw_pushes,
+    finish,
+    legend_above,
+    new_figure,
+    runs_of,
+)
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 
 _SIZE = (9.5, 6.8)
@@ -55,6 +64,7 @@ def _components(runs: Sequence[Run], what: str, columns: Sequence[tuple[str, str
             draw_lines(axes, runs, [getattr(run.trajectory, name)[row : row + 1] for run in runs], name, ())
             axes.set_ylabel(f"{title} {axis} [{QUANTITIES[name].unit}]")
             draw_flight([axes], runs, labelled=grid[0, 0])
+            draw_pushes([axes], runs, labelled=grid[0, 0])
             finish([axes], least)
         grid[2, column].set_xlabel("time [s]")
     legend_above(grid[0, 0])

@@ -19,7 +19,7 @@ from multimodal_to.errors import InputError, OutputError
 from multimodal_to.files.writing import whole
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory, rules
-from multimodal_to.trajectory.derived import flight_phases, without_acceleration
+from multimodal_to.trajectory.derived import acting_times, flight_phases, outside_forces, spans, without_acceleration
 from multimodal_to.trajectory.sameness import refuse_other_robot
 from multimodal_to.values import Value
 
@@ -29,6 +29,7 @@ SUFFIXES = (".png", ".svg", ".pdf")
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # told apart by colour-blind eyes too
 STYLES = ("-", "--", "-.", ":")
 FLIGHT: dict[str, Any] = {"facecolor": "#d62728", "alpha": 0.12, "linewidth": 0.0, "zorder": 0.5}
+PUSH: dict[str, Any] = {"facecolor": "#b5179e", "alpha": 0.12, "linewidth": 0.0, "zorder": 0.5}
 LIMIT: dict[str, Any] = {"color": "0.35", "linestyle": (0, (6, 4)), "linewidth": 0.8}
 SMALL = "small"  # text of legends and ticks
 _LEGEND_ROWS = 2
@@ -166,6 +167,24 @@ def draw_flight(all_axes: Iterable[Axes], runs: Sequence[Run], labelled: Axes | 
     for axes in all_axes:
         for index, (start, end) in enumerate(phases):
             axes.axvspan(start, end, label="flight" if axes is labelled and index == 0 else None, **look)
+
+
+def draw_pushes(all_axes: Iterable[Axes], runs: Sequence[Run], labelled: Axes | None = None) -> None:
+    """Draw a translucent purple band while a known push acts in any run, with one entry in the legend of one axes.
+
+    Args:
+        all_axes: to draw in, with the time along x [s].
+        runs: whose pushes.
+        labelled: the one of them with an entry in its legend.
+    """
+    bands = list[tuple[float, float]]()
+    for run in runs:
+        acts = [force.any(axis=0) for _, force in outside_forces(run.trajectory)]
+        if acts:
+            bands += spans(np.any(acts, axis=0), *acting_times(run.trajectory))
+    for axes in all_axes:
+        for index, (start, end) in enumerate(dict.fromkeys(bands)):
+            axes.axvspan(start, end, label="known push" if axes is labelled and index == 0 else None, **PUSH)
 
 
 def finish(all_axes: Iterable[Axes], least_span: float = 0.0) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from multimodal_to.models.jet import JetModel
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.scene import Y_TO_Z, Scene, SmoothMesh, segment, shapes, translation, turns_from_z
 from multimodal_to.trajectory import Trajectory
-from multimodal_to.trajectory.derived import at_knots, flight_force
+from multimodal_to.trajectory.derived import at_knots, flight_force, frame_poses
 
 FLAME_LENGTH = 0.45
 """Length of the flame of the robot's strongest jet at its greatest thrust; others in proportion to their thrust [m]."""
@@ -29,6 +29,7 @@ _LAYERS = (  # of a flame, each drawn over those before: colour, width and lengt
 )
 _AIR = (("plume", 0xBFD9EC, 1.0, 1.0, 0.30), ("core", 0xFFFFFF, 0.5, 0.7, 0.35))  # of what does not burn, likewise
 _FAINTEST = 0.25  # opacity of a flame almost without thrust, as a share of that at full thrust
+_CONTACT_COLOURS, _PUSH_COLOURS = (0x1FA34A, 0x08401B), (0xB5179E, 0x4A0940)  # of arrows, in and out of the light
 _COM_COLOUR = 0x2B6CE0
 _TRACE_RADIUS = 0.003  # of the way of the CoM [m]
 _TRACE_STEP = 0.002  # points of it that are nearer than this to the one before are left out [m]
@@ -83,17 +84,55 @@ def draw_contact_forces(scene: Scene, robot: Robot, trajectory: Trajectory, root
         trajectory: whose contact positions [m] and forces [N].
         root: path in the scene that all arrows are below.
     """
-    colour = shapes.MeshLambertMaterial(color=0x1FA34A, emissive=0x08401B)
     positions, smallest = trajectory.per_contact("contact_positions"), flight_force(robot)
     forces = at_knots(trajectory, "contact_forces").reshape(positions.shape)
     for name, position, force in zip(trajectory.contact_names, positions, forces, strict=True):
-        path, size = f"{root}/{segment(name)}", np.linalg.norm(force, axis=0)
-        shaft, tip = shapes.Cylinder(0.75, radius=0.006), shapes.Cylinder(0.25, radiusTop=0.0, radiusBottom=0.015)
-        scene.add(f"{path}/shaft", shaft, colour, translation([0.0, 0.0, 0.375]) @ Y_TO_Z)
-        scene.add(f"{path}/tip", tip, colour, translation([0.0, 0.0, 0.875]) @ Y_TO_Z)
-        scene.set(path, "position", position.T)
-        scene.set(path, "quaternion", turns_from_z(force.T, smallest))
-        _stretch(scene, path, ARROW_LENGTH * np.where(size < smallest, 0.0, size) / robot.weight)
+        lengths = _arrow(scene, f"{root}/{segment(name)}", force, robot.weight, smallest, _CONTACT_COLOURS)
+        scene.set(f"{root}/{segment(name)}", "position", position.T)
+        _stretch(scene, f"{root}/{segment(name)}", lengths)
+
+
+def draw_pushes(
+    scene: Scene,
+    robot: Robot,
+    trajectory: Trajectory,
+    pushes: Sequence[tuple[str, Array]],
+    root: str = "pushes",
+) -> None:
+    """Draw each known push as an arrow that ends where it pushes, as long as a contact force of its size.
+
+    Args:
+        scene: where to draw.
+        robot: whose weight is the measure of the arrows.
+        trajectory: whose frames are pushed.
+        pushes: the frame and its force at every knot [N], (3, knots + 1).
+        root: path in the scene that all arrows are below.
+    """
+    for index, (frame, force) in enumerate(pushes):
+        path = f"{root}/{index}"
+        lengths = _arrow(scene, path, force, robot.weight, flight_force(robot), _PUSH_COLOURS)
+        along = force.T / np.maximum(np.linalg.norm(force, axis=0), 1e-9)[:, None]
+        scene.set(path, "position", frame_poses(robot, trajectory, frame)[:, :3, 3] - lengths[:, None] * along)
+        _stretch(scene, path, lengths)
+
+
+def _arrow(scene: Scene, path: str, force: Array, weight: float, smallest: float, colours: tuple[int, int]) -> Array:
+    """Add an arrow of length 1 that points along a force, and return how long it is at every knot [m], (knots + 1,).
+
+    Args:
+        scene: where to draw.
+        path: of the arrow.
+        force: at every knot [N], (3, knots + 1).
+        weight: of the robot, whose arrow is `ARROW_LENGTH` long [N].
+        smallest: force that has an arrow [N].
+        colours: of the arrow, and what it has where no light falls on it.
+    """
+    colour, size = shapes.MeshLambertMaterial(color=colours[0], emissive=colours[1]), np.linalg.norm(force, axis=0)
+    shaft, tip = shapes.Cylinder(0.75, radius=0.006), shapes.Cylinder(0.25, radiusTop=0.0, radiusBottom=0.015)
+    scene.add(f"{path}/shaft", shaft, colour, translation([0.0, 0.0, 0.375]) @ Y_TO_Z)
+    scene.add(f"{path}/tip", tip, colour, translation([0.0, 0.0, 0.875]) @ Y_TO_Z)
+    scene.set(path, "quaternion", turns_from_z(force.T, smallest))
+    return np.asarray(ARROW_LENGTH * np.where(size < smallest, 0.0, size) / weight)
 
 
 def draw_com(scene: Scene, trajectory: Trajectory) -> None:

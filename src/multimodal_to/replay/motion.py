@@ -14,14 +14,15 @@ from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround, Surface, heights_below, uphill
 from multimodal_to.replay.bodies import draw_links, draw_visuals, drawn, faded, link_paths, link_poses
-from multimodal_to.replay.effects import draw_com, draw_com_trace, draw_contact_forces, draw_flames
+from multimodal_to.replay.effects import draw_com, draw_com_trace, draw_contact_forces, draw_flames, draw_pushes
 from multimodal_to.replay.ghost import draw_ghost, in_step
+from multimodal_to.replay.regions import draw_regions, regions_of
 from multimodal_to.replay.scene import Scene, meshcat
 from multimodal_to.replay.stage import View, draw_stage
 from multimodal_to.replay.visuals import Appearance, Visual
 from multimodal_to.scenarios.data import OwnSurfaceError, stored
 from multimodal_to.trajectory import QUANTITIES, Trajectory
-from multimodal_to.trajectory.derived import frame_poses
+from multimodal_to.trajectory.derived import acting_times, frame_poses, outside_forces
 from multimodal_to.trajectory.resampling import resample
 from multimodal_to.trajectory.sameness import refuse_other_robot
 
@@ -63,7 +64,7 @@ def draw_motion(
     ghost: Trajectory | None = None,
     live: bool = False,
 ) -> Picture:
-    """Draw stage, robot, flames, contact forces and CoM, and set the animation that moves them, at true speed.
+    """Draw stage, walls and boxes, robot, flames, forces and CoM, and set the animation that moves them, at true speed.
 
     In meshcat's own `live` page the animation also moves the scene so that the camera follows, which ours does itself,
     and flames keep one brightness, since it knows the materials too late.
@@ -91,12 +92,14 @@ def draw_motion(
     direction = _BEHIND_LEFT if _rises(surface, com.mean(axis=0), _HALF_LEFT) else _HALF_LEFT
     view = _view(np.array([[low, high]]), direction)
     draw_stage(scene, view, surface, reach=float(span.max()))
+    draw_regions(scene, view, regions_of(trajectory))
 
     paths = link_paths(robot, look, "robot")
     draw_links(scene, paths, link_poses(robot, trajectory, paths))
     draw_visuals(scene, paths, {visual: drawn(visual) for visual in look.visuals})
     draw_flames(scene, robot, trajectory.thrust, paths, steady=live)
     draw_contact_forces(scene, robot, trajectory)
+    draw_pushes(scene, robot, trajectory, outside_forces(trajectory))
     draw_com(scene, trajectory)
     if ghost is not None:
         draw_ghost(scene, robot, ghost, look)
@@ -146,7 +149,10 @@ def draw_still(
     view = _view(np.array(boxes), direction, aspect=aspect, zoom=_STILL_ZOOM)
     scene = Scene(visualizer=visualizer, time=np.zeros(1))
     draw_stage(scene, view, surface)
+    if not apart:
+        draw_regions(scene, view, regions_of(trajectory))
     bodies = {visual: drawn(visual) for visual in look.visuals}
+    acting = np.minimum(np.searchsorted(acting_times(trajectory)[1], instants - 1e-9), trajectory.knots)
     opacities = np.ones(len(ghosts)) if apart else np.linspace(_FAINTEST, 1.0, len(ghosts))
     for index, (ghost, offset, opacity) in enumerate(zip(ghosts, offsets, opacities.tolist(), strict=True)):
         paths = link_paths(robot, look, f"ghost_{index}/robot")
@@ -154,6 +160,8 @@ def draw_still(
         draw_visuals(scene, paths, bodies if opacity == 1.0 else faded(bodies, opacity))
         draw_flames(scene, robot, ghost.thrust, paths, opacity=opacity)
         draw_contact_forces(scene, robot, ghost, f"ghost_{index}/contact_forces")
+        pushes = [(frame, force[:, acting[[index, index]]]) for frame, force in outside_forces(trajectory)]
+        draw_pushes(scene, robot, ghost, pushes, f"ghost_{index}/pushes")
         visualizer[f"ghost_{index}"].set_property("position", offset.tolist())
     if not apart:
         draw_com_trace(scene, trajectory)

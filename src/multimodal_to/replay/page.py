@@ -20,14 +20,18 @@ from multimodal_to.files.writing import write_text
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.ghost import GHOST_COLOUR
 from multimodal_to.replay.motion import Picture, draw_motion, draw_still
+from multimodal_to.replay.regions import COLOUR, regions_of
 from multimodal_to.replay.scene import HOLD, Recorder, meshcat
 from multimodal_to.replay.visuals import appearance
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import flight_phases
+from multimodal_to.trajectory.pushes import known_pushes
 
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
 _FLAME = ("#f58a24", "flame: thrust of a jet")
 _ARROW = ("#1fa34a", "arrow: contact force")
+_PUSH = ("#b5179e", "arrow: push from outside")
+_REGION = (f"#{COLOUR:06x}", "seen through: wall or box of the task")
 _COM = ("#2b6ce0", "sphere and line: centre of mass")
 _MARK = "#111111"
 _FLIGHT = ("#d62728", "bar above the time: flight")
@@ -156,7 +160,14 @@ def _player(
     marks: Mapping[float, str] = MappingProxyType({}),
 ) -> str:
     phases = [] if picture.still or not trajectory.contact_names else flight_phases(robot, trajectory)
-    shown = {_FLAME: trajectory.jet_names, _ARROW: trajectory.contact_names, _COM: not picture.still, _FLIGHT: phases}
+    shown = {
+        _FLAME: trajectory.jet_names,
+        _ARROW: trajectory.contact_names,
+        _PUSH: known_pushes(trajectory),
+        _REGION: regions_of(trajectory),
+        _COM: not picture.still,
+        _FLIGHT: phases,
+    }
     keys = [
         f'<div><span class="key" style="background: {colour}"></span>{text}</div>'
         for (colour, text), some in shown.items()

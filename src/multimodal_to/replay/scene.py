@@ -116,7 +116,7 @@ class Scene:
             content = {"type": "set_property", "path": where, "property": "castShadow", "value": False}
             self.visualizer.window.send(Command(content=content))
 
-    def set(self, path: str, key: str, values: Array) -> None:
+    def set(self, path: str, key: str, values: np.ndarray) -> None:
         """Give a node its property at every knot, (knots + 1, ...): as keyframes, or once if it never changes.
 
         Args:
@@ -130,7 +130,7 @@ class Scene:
             return
         self.move(path, key, values)
 
-    def move(self, path: str, key: str, values: Array) -> None:
+    def move(self, path: str, key: str, values: np.ndarray) -> None:
         """Give a node keyframes of a property at every knot, (knots + 1, ...).
 
         Args:

@@ -15,9 +15,9 @@ from multimodal_to.scenarios.contacts import ContactState, ContactStretch
 from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitKind, GaitPlan
 from multimodal_to.scenarios.keyframes import FrameTarget, Keyframe, Momentum
-from multimodal_to.scenarios.pushes import KnownPush
 from multimodal_to.scenarios.regions import Box, Wall
 from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
+from multimodal_to.trajectory.pushes import KnownPush
 
 __all__ = [
     "SCENARIOS",

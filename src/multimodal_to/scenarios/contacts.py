@@ -10,6 +10,7 @@ from enum import Enum
 
 from multimodal_to.arguments import check_fields
 from multimodal_to.errors import ScenarioError, shown
+from multimodal_to.trajectory.instants import Instant, check_stretch
 
 
 class ContactState(Enum):
@@ -35,10 +36,10 @@ class ContactStretch:
     """Feet, or single contact points, by name; a name alone is a list of one."""
     state: ContactState
     """What is given."""
-    begin: float = 0.0
-    """Where the stretch begins, as a share of the horizon [1]."""
-    end: float = 1.0
-    """Where the stretch ends, as a share of the horizon [1]."""
+    begin: Instant = 0.0
+    """When the stretch begins: a share of the horizon, "start" or "end" [1]."""
+    end: Instant = 1.0
+    """When the stretch ends, likewise [1]."""
     clearance: float = 0.0
     """Least height above the ground in the middle of a stretch that is off [m]."""
 
@@ -49,11 +50,7 @@ class ContactStretch:
         object.__setattr__(self, "of", tuple(self.of))
         if not self.of:
             raise ScenarioError("contacts: 'of' is empty; expected the name of a foot or of a contact point")
-        if not 0.0 <= self.begin < self.end <= 1.0:
-            raise ScenarioError(
-                f"contacts: begin is {shown(self.begin)} and end {shown(self.end)}; expected 0 <= begin < end <= 1, "
-                "as shares of the horizon"
-            )
+        check_stretch(self.begin, self.end, "contacts", ScenarioError)
         if not 0.0 <= self.clearance < float("inf"):
             raise ScenarioError(f"contacts: clearance is {shown(self.clearance)}; expected at least zero [m]")
         if self.clearance and self.state is not ContactState.OFF:

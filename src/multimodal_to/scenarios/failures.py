@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from multimodal_to.arguments import check_fields
 from multimodal_to.errors import ScenarioError, shown, unknown
+from multimodal_to.trajectory.instants import Instant, check_instant, knot_at, share
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,12 +23,13 @@ class JetFailure:
 
     jet: str
     """The jet, by its name."""
-    at: float = 0.0
-    """When it fails, as a share of the horizon [1]."""
+    at: Instant = 0.0
+    """When it fails: a share of the horizon below 1, or "start" [1]."""
 
     def __post_init__(self) -> None:
         check_fields(self, ScenarioError, "failures: ")
-        if not 0.0 <= self.at < 1.0:
+        check_instant(self.at, "failures: at", ScenarioError)
+        if share(self.at) == 1.0:
             raise ScenarioError(f"failures: at is {shown(self.at)}; expected at least 0 and below 1, of the horizon")
 
 
@@ -46,6 +48,6 @@ def failing_knots(failures: Sequence[JetFailure], jets: Sequence[str], knots: in
     for failure in failures:
         if failure.jet not in jets:
             raise ScenarioError(f"failures: {unknown('jet', failure.jet, jets)}")
-        row, knot = list(jets).index(failure.jet), round(failure.at * knots)
+        row, knot = list(jets).index(failure.jet), knot_at(failure.at, knots)
         found[row] = min(knot, found.get(row, knot))
     return found

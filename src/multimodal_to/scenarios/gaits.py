@@ -15,6 +15,7 @@ from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import ScenarioError, listed, shown
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.contacts import ContactState, ContactStretch
+from multimodal_to.trajectory.instants import Instant, check_stretch, share
 
 
 class GaitKind(Enum):
@@ -42,10 +43,10 @@ class GaitPlan:
     """Which feet swing together."""
     steps: int
     """How many swings there are, of all groups of feet together [1]."""
-    begin: float = 0.1
-    """Where the first step begins, as a share of the horizon [1]."""
-    end: float = 0.9
-    """Where the last step ends, as a share of the horizon [1]."""
+    begin: Instant = 0.1
+    """When the first step begins: a share of the horizon, "start" or "end" [1]."""
+    end: Instant = 0.9
+    """When the last step ends, likewise [1]."""
     swing: float = 0.75
     """Share of a step's time in which its feet are in the air [1]; with 1 the next feet leave as these land."""
     clearance: float | None = None
@@ -57,11 +58,7 @@ class GaitPlan:
         check_fields(self, ScenarioError, "gait: ")
         if self.steps < 1:
             raise ScenarioError(f"gait: steps is {shown(self.steps)}; expected at least one")
-        if not 0.0 <= self.begin < self.end <= 1.0:
-            raise ScenarioError(
-                f"gait: begin is {shown(self.begin)} and end {shown(self.end)}; expected 0 <= begin < end <= 1, as "
-                "shares of the horizon"
-            )
+        check_stretch(self.begin, self.end, "gait", ScenarioError)
         if not 0.0 < self.swing <= 1.0:
             raise ScenarioError(f"gait: swing is {shown(self.swing)}; expected a number above 0 and at most 1")
         if self.clearance is not None and not 0.0 <= self.clearance < float("inf"):
@@ -76,10 +73,11 @@ class GaitPlan:
         """
         groups = _led_by(self.first, groups_of(robot, self.kind))
         clearance = 0.5 * robot.gait.lift if self.clearance is None else self.clearance
-        step = (self.end - self.begin) / self.steps
+        begin = share(self.begin)
+        step = (share(self.end) - begin) / self.steps
         swings = {foot: list[tuple[float, float]]() for foot in robot.feet}
         for index in range(self.steps):
-            middle, half = self.begin + (index + 0.5) * step, 0.5 * self.swing * step
+            middle, half = begin + (index + 0.5) * step, 0.5 * self.swing * step
             for foot in groups[index % len(groups)]:
                 swings[foot].append((middle - half, middle + half))
         found = list[ContactStretch]()

@@ -13,6 +13,7 @@ from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import InputError, ScenarioError, shown, unknown
 from multimodal_to.models import attitude
 from multimodal_to.models.robot import Robot
+from multimodal_to.trajectory.instants import START, Instant, check_instant, knot_at
 from multimodal_to.values import FrozenMapping
 
 Vector3 = tuple[float, float, float]
@@ -20,9 +21,10 @@ Quaternion = tuple[float, float, float, float]
 AXES = "xyz"
 HOME = "home"
 """What stands for the CoM of home: `Robot.home_com`, on the ground below the world's origin."""
-START, END = "start", "end"
 _ROUNDING = 1e-9
 """Limits that cross by less do not contradict each other, in their units."""
+_ANGLE = 1e-6
+"""Attitudes that are less apart are the same [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +83,7 @@ class Keyframe:
         InputError: a number makes no sense, parts contradict each other, or nothing is asked.
     """
 
-    when: float | str | None = None
+    when: Instant | None = None
     """Share of the horizon from 0 to 1, "start" or "end" [1]; the nearest knot is taken."""
     knot: int | None = None
     """Which knot, from 0 to the number of intervals, instead of `when` [1]."""
@@ -143,9 +145,7 @@ class Keyframe:
         """Return the knot of a horizon of so many intervals."""
         if self.knot is not None:
             return self.knot
-        if isinstance(self.when, str):
-            return knots if self.when == END else 0
-        return round((self.when or 0.0) * knots)
+        return knot_at(START if self.when is None else self.when, knots)
 
     @property
     def of_home(self) -> bool:
@@ -214,10 +214,8 @@ class Keyframe:
             raise InputError("a keyframe has 'when' or 'knot'; expected one of them")
         if self.knot is not None and self.knot < 0:
             raise InputError(f"knot is {self.knot}; expected a number of at least zero")
-        if isinstance(self.when, str) and self.when not in (START, END):
-            raise InputError(f"when is {shown(self.when)}; expected a share from 0 to 1, '{START}' or '{END}'")
-        if isinstance(self.when, int | float) and not 0.0 <= self.when <= 1.0:
-            raise InputError(f"when is {self.when}; expected a share from 0 to 1, '{START}' or '{END}'")
+        if self.when is not None:
+            check_instant(self.when, "when", InputError)
 
     def _check_com(self) -> None:
         if isinstance(self.com, str):
@@ -282,6 +280,31 @@ def contradiction(placed: Sequence[Placed]) -> str:
                 both = f"{label} and {one.label}" if label and label != one.label else one.label
                 return f"{both}: {what} at knot {one.knot} has to be {_said(low, high)} and {_said(lower, upper)}"
             known[one.knot, what] = max(low, lower), min(high, upper), label or one.label
+    return _turned_twice(placed)
+
+
+def _turned_twice(placed: Sequence[Placed]) -> str:
+    """Return in one sentence which two keyframes at a knot ask for attitudes that are too far apart."""
+    known = dict[tuple[int, str], tuple[Array, float, str]]()
+    yaws = {one.knot: one.label for one in placed if one.keyframe.weight is None and one.keyframe.yaw is not None}
+    for one in placed:
+        keyframe = one.keyframe
+        if keyframe.weight is not None:
+            continue
+        asked = {
+            f"frame {name}": (some.orientation, some.orientation_tolerance) for name, some in keyframe.frames.items()
+        }
+        asked["base"] = keyframe.base_orientation, keyframe.orientation_tolerance
+        if keyframe.base_orientation is not None and one.knot in yaws:
+            return f"{yaws[one.knot]} asks for a yaw at knot {one.knot} and {one.label} for a base_orientation"
+        for what, (orientation, tolerance) in asked.items():
+            if orientation is None:
+                continue
+            value = np.array(orientation)
+            before, slack, label = known.setdefault((one.knot, what), (value, tolerance, one.label))
+            angle = 2.0 * math.acos(min(abs(float(before @ value)), 1.0))
+            if angle > math.sqrt(3.0) * (slack + tolerance) + _ANGLE:
+                return f"{label} and {one.label}: {what} at knot {one.knot} has two orientations, {angle:.3g} rad apart"
     return ""
 
 

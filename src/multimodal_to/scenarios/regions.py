@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from multimodal_to.arguments import check_fields
 from multimodal_to.errors import ScenarioError, shown
+from multimodal_to.trajectory.instants import Instant, check_stretch
 
 Vector3 = tuple[float, float, float]
 
@@ -27,10 +28,10 @@ class Wall:
     """Links or frames whose origins stay there; without any, all capsules of the robot's links do."""
     distance: float = 0.0
     """How far they stay away from the wall [m]."""
-    begin: float = 0.0
-    """From when on, as a share of the horizon [1]."""
-    end: float = 1.0
-    """Until when, as a share of the horizon [1]."""
+    begin: Instant = 0.0
+    """From when on: a share of the horizon, "start" or "end" [1]."""
+    end: Instant = 1.0
+    """Until when, likewise [1]."""
 
     def __post_init__(self) -> None:
         _check(self, "walls")
@@ -66,10 +67,10 @@ class Box:
     """Links or frames whose origins do so; without any, all capsules of the robot's links do."""
     distance: float = 0.0
     """How far they stay away from its faces [m]."""
-    begin: float = 0.0
-    """From when on, as a share of the horizon [1]."""
-    end: float = 1.0
-    """Until when, as a share of the horizon [1]."""
+    begin: Instant = 0.0
+    """From when on: a share of the horizon, "start" or "end" [1]."""
+    end: Instant = 1.0
+    """Until when, likewise [1]."""
 
     def __post_init__(self) -> None:
         _check(self, "boxes")
@@ -93,10 +94,6 @@ def _check(region: Wall | Box, what: str) -> None:
             if len(value) != 3:
                 raise ScenarioError(f"{what}: {name} is {shown(value)}; expected three numbers")
             object.__setattr__(region, name, tuple(map(float, value)))
-    if not 0.0 <= region.begin <= region.end <= 1.0:
-        raise ScenarioError(
-            f"{what}: begin is {shown(region.begin)} and end {shown(region.end)}; expected 0 <= begin <= end <= 1, as "
-            "shares of the horizon"
-        )
+    check_stretch(region.begin, region.end, what, ScenarioError, points=True)
     if not 0.0 <= region.distance < math.inf:
         raise ScenarioError(f"{what}: distance is {shown(region.distance)}; expected at least zero [m]")

@@ -20,17 +20,16 @@ from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitPlan
 from multimodal_to.scenarios.keyframes import (
     AXES,
-    END,
     HOME,
-    START,
     Keyframe,
     Placed,
     asked_of,
     by_axis,
     contradiction,
 )
-from multimodal_to.scenarios.pushes import KnownPush
 from multimodal_to.scenarios.regions import Box, Wall
+from multimodal_to.trajectory.instants import END, START
+from multimodal_to.trajectory.pushes import KnownPush
 from multimodal_to.values import FrozenMapping
 
 Vector3 = tuple[float, float, float]
@@ -313,7 +312,7 @@ class Scenario:
         Raises:
             ScenarioError: it is said from a robot's home, see `for_robot`, or a state will say it.
         """
-        asked = [self.initial_com, *(one.com for one in self._held_at(0))]
+        asked = [self.initial_com, *(one.com for one in self.held_at(0))]
         found = next((com for com in asked if isinstance(com, tuple)), None)
         if found is None:
             raise ScenarioError("initial_com is no position yet; expected a scenario of `for_robot`")
@@ -333,7 +332,7 @@ class Scenario:
     def says_end_com(self) -> bool:
         """Return whether the whole CoM is asked for at the end, by `final_com` or by a keyframe."""
         return self.final_com is not None or any(
-            one.of_home or isinstance(one.com, tuple) for one in self._held_at(self.knots)
+            one.of_home or isinstance(one.com, tuple) for one in self.held_at(self.knots)
         )
 
     @checked
@@ -390,13 +389,13 @@ class Scenario:
         """Return every keyframe at its knot: those with a short name, then those of `keyframes`."""
         return (*self.short_keyframes(), *self.own_keyframes())
 
-    def _held_at(self, knot: int) -> list[Keyframe]:
-        """Return those of `keyframes` that hold at a knot."""
+    def held_at(self, knot: int) -> list[Keyframe]:
+        """Return those of `keyframes` that hold at a knot, and are no costs."""
         return [one for one in self.keyframes if one.weight is None and one.at(self.knots) == knot]
 
     def _take_ends(self) -> None:
         """Take how it starts and ends from the keyframes of the first and last knots, which have to say it then."""
-        first, last = self._held_at(0), self._held_at(self.knots)
+        first, last = self.held_at(0), self.held_at(self.knots)
         self._take_state()
         if self.start is None:
             object.__setattr__(self, "start", Start.HOVER if any(one.hover for one in first) else Start.STANDING)
@@ -453,11 +452,13 @@ class Scenario:
 
     def _check_first(self, one: Placed) -> None:
         """Refuse what the start says itself: a standing start is a posture that is found, a given one is a state."""
-        more = [name for name in asked_of(one.keyframe) if name not in _OF_START]
-        if more and self.start is not Start.HOVER:
+        if self.start is Start.HOVER:
+            return
+        taken = (*_OF_START, "yaw", "joints") if self.start is Start.STANDING else _OF_START
+        if more := [name for name in asked_of(one.keyframe) if name not in taken]:
             raise ScenarioError(
                 f"{one.label} asks for {listed(more)} at the first knot, and a start that is '{word(self.start)}' "
-                "gives the whole posture there; expected it at a later knot, or a start in a hover"
+                "gives the rest of the posture there; expected it at a later knot, or a start in a hover"
             )
 
     def _check_name(self) -> None:
@@ -532,7 +533,7 @@ _ASKED: dict[Start | Terminal | None, dict[str, object]] = {
 }
 """What a start or an end is as a keyframe."""
 _OF_START = ("com", "com_shift", "standing", "rest")
-"""What a keyframe may ask for at a first knot that is not found."""
+"""What a keyframe may ask for at a first knot that is not found; a standing one may be turned and bent as well."""
 
 
 def _placed(com: Vector3 | str | None, shift: Vector3 | None, home: Vector3) -> Vector3 | str | None:

@@ -19,12 +19,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.jet import Jet, JetModel
 from multimodal_to.models.state import State
 from multimodal_to.models.units import Sized
 from multimodal_to.simulation.controller import Belief
+from multimodal_to.simulation.known import Known
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference
 from multimodal_to.simulation.stabiliser import JOINT_MAX, effect_of_joints, rotation_vector, skew
@@ -82,10 +84,11 @@ class Feedback:
         plan: with rows a `period` apart.
         period: [s].
         how: how large errors and inputs may be.
+        known: which jets fail, and when: nothing is asked of them from then on.
     """
 
-    def __init__(self, belief: Belief, plan: Reference, period: float, how: LookAhead) -> None:
-        self._belief, self._plan, self._period = belief, plan, period
+    def __init__(self, belief: Belief, plan: Reference, period: float, how: LookAhead, known: Known) -> None:
+        self._belief, self._plan, self._period, self._known = belief, plan, period, known
         self._every = max(round(GRID / period), 1)
         self._standing = self._gains(how, stands=True)
         self._flying = self._gains(how, stands=False) if belief.simulation.robot.jets else self._standing
@@ -130,7 +133,8 @@ class Feedback:
         jets, units = len(robot.jets), robot.units
         ahead = round(TURBINE / self._period)
         systems = [
-            _System.at(belief, plan, row, ahead, how, stands=stands) for row in range(0, len(plan.com), self._every)
+            _System.at(belief, plan, row, ahead, how, stands=stands, works=self._known.works(row * self._period))
+            for row in range(0, len(plan.com), self._every)
         ]
         turning = np.array([system.turning for system in systems])
         if not jets:
@@ -168,7 +172,17 @@ class _System:
     free: float  # share of the weight that the feet do not carry, now or soon [1]
 
     @classmethod
-    def at(cls, belief: Belief, plan: Reference, row: int, ahead: int, how: LookAhead, *, stands: bool) -> _System:
+    def at(
+        cls,
+        belief: Belief,
+        plan: Reference,
+        row: int,
+        ahead: int,
+        how: LookAhead,
+        *,
+        stands: bool,
+        works: NDArray[np.bool_],
+    ) -> _System:
         simulation, data = belief.simulation, belief.data
         robot = simulation.robot
         jets, count = len(robot.jets), len(robot.joint_names)
@@ -208,7 +222,7 @@ class _System:
             errors[18 + jets + index, 18 + index] = of_thrust
             errors[18 + jets + index, 18 + jets + index] = of_rate
             effect[18 + jets + index, index] = of_throttle
-            spreads[index, index] = how.throttle * (jet.throttle_max - jet.throttle_min)
+            spreads[index, index] = how.throttle * (jet.throttle_max - jet.throttle_min) * works[index]
         of_point = (
             np.hstack([np.vstack([np.eye(3), skew(point)]) for point in points]) if len(points) else np.zeros((6, 0))
         )

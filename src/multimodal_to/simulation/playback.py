@@ -2,6 +2,7 @@
 
 A joint's motor gives the torque of the command and what its servo adds, clipped at the joint's effort limit. Turbines
 are integrated from their own dynamics under the throttle of the command. Commands act after a delay, servos at once.
+Pushes that the plan knows of push the robot, and its jets fail when the plan has them fail.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.simulation.controller import Command, Controller, Servos
 from multimodal_to.simulation.disturbance import Disturbance
+from multimodal_to.simulation.known import Known
 from multimodal_to.simulation.model import TIME_STEP, SimulationModel, mujoco_module
 from multimodal_to.simulation.noise import Estimate
 from multimodal_to.simulation.reference import Reference, reference
@@ -121,6 +123,8 @@ class Player:
         self._data = self._mujoco.MjData(self._simulation.model)
         self._rows = list[dict[str, Array]]()
         self._reference: Reference
+        self._known: Known
+        self._since = 0.0
         self._followed = list[Reference]()
         self._down: float | None = None
         self._thrust, self._rate = plan.thrust[:, 0].copy(), plan.thrust_rate[:, 0].copy()
@@ -163,6 +167,7 @@ class Player:
 
     def follow(self, plan: Trajectory, since: float) -> None:
         """Let the controller follow a plan from now on, whose first knot is or was at a time since the start [s]."""
+        self._known, self._since = Known.of(self._robot, plan), since
         self._controller.reset(self._robot, plan, since)
 
     def run(self, wanted: Reference) -> None:
@@ -179,8 +184,10 @@ class Player:
             if self._down is not None:
                 self._rows.append(self._rows[-1])
                 continue
-            data.xfrc_applied[1, :3] = 0.0 if push is None else push.at(self.time)
             self._mujoco.mj_step1(model, data)
+            data.xfrc_applied[:] = 0.0
+            data.xfrc_applied[1, :3] = 0.0 if push is None else push.at(self.time)
+            self._known.push(self._simulation, data, self.time - self._since)
             row = self._state()
             if self.steps % self._every == 0:
                 self._decide(row)
@@ -266,8 +273,14 @@ class Player:
             self._throttle[index] = min(max(float(command.throttle[index]), jet.throttle_min), jet.throttle_max)
 
     def _turn_turbines(self) -> None:
-        """Integrate the thrusts over a step."""
+        """Integrate the thrusts over a step; one that has failed gets no more fuel than it must, or never lit."""
+        works = self._known.works(self.time - self._since)
         for index, jet in enumerate(self._robot.jets):
+            if not works[index]:
+                self._throttle[index] = jet.throttle_min
+            if self._known.unlit[index]:
+                self._thrust[index], self._rate[index] = 0.0, 0.0
+                continue
             state = float(self._thrust[index]), float(self._rate[index])
             self._rate[index], thrust = _spooled(jet, state, float(self._throttle[index]))
             self._thrust[index] = max(thrust, 0.0)

@@ -11,6 +11,7 @@ from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.simulation.controller import Belief, Command, Servos, row_of, servo
+from multimodal_to.simulation.known import Known
 from multimodal_to.simulation.look_ahead import Feedback, LookAhead
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
@@ -71,7 +72,7 @@ class ServoController:
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
         units, gains = robot.units, self._gains
         self._balance = Balance(gains=gains, units=units, inertia=inertia(robot), friction=self._belief.friction)
-        self._feedback = Feedback(self._belief, self._plan, PERIOD, gains.look_ahead)
+        self._feedback = Feedback(self._belief, self._plan, PERIOD, gains.look_ahead, Known.of(robot, plan))
         count = len(robot.joint_names)
         self._servo = servo(units, count, gains.stiffness, gains.damping)
         if first:

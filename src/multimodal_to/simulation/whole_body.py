@@ -6,6 +6,7 @@ With ν̇ the accelerations of base and joints, f the forces at the contact poin
 
 with f within the friction cones and the torques τ, which act on the joints alone, within the effort limits. The tasks i
 are the momentum's rate, the base's attitude, the feet and the posture; each a_i is that of the plan and a feedback.
+Pushes that the plan knows of stand beside the thrusts.
 
 Forces are allowed at all points of a foot that the plan loads and that is near the ground, and not only where it
 touches: else a foot that comes down on its heel stays there. Throttles come from `look_ahead`, and with them what the
@@ -31,6 +32,7 @@ from multimodal_to.models.units import Sized, Units
 from multimodal_to.scenarios.data import stored
 from multimodal_to.simulation.controller import Belief, Command, Servos, row_of, servo
 from multimodal_to.simulation.feet import PlannedFeet
+from multimodal_to.simulation.known import Known
 from multimodal_to.simulation.look_ahead import Feedback, LookAhead
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
@@ -138,6 +140,7 @@ class WholeBodyController:
         self._plan: Reference
         self._feet: PlannedFeet
         self._feedback: Feedback
+        self._known: Known
         self._units: Units
         self._ground: cs.Function | None
         self._legs: NDArray[np.bool_]
@@ -164,7 +167,8 @@ class WholeBodyController:
         self._units, self._belief = robot.units, Belief.of(robot, plan, None if first else self._belief)
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
         self._feet = PlannedFeet.along(self._belief, self._plan, PERIOD)
-        self._feedback = Feedback(self._belief, self._plan, PERIOD, self._gains.look_ahead)
+        self._known = Known.of(robot, plan)
+        self._feedback = Feedback(self._belief, self._plan, PERIOD, self._gains.look_ahead, self._known)
         scenario = stored(plan)
         surface = FlatGround() if scenario is None else scenario.surface
         self._ground = frame_function(surface).map(len(robot.contacts)) if robot.contacts else None
@@ -227,7 +231,9 @@ class WholeBodyController:
             self._attitude(step, stands),
             self._posture(state, step, stands),
         ]
-        return self._least(tasks, contacts, mass, bias - self._of_thrusts(state), step)
+        pushed = self._known.generalised(self._belief.simulation, self._belief.data, time - self._since)
+        outside = self._of_thrusts(state) + pushed @ self._belief.of_joints
+        return self._least(tasks, contacts, mass, bias - outside, step)
 
     def _jacobian(self, point: Array, body: int) -> Array:
         """Return that of a body's point and its turning, in (ṗ, ω in the base's axes, ṡ), (6, 6 + n)."""
@@ -408,7 +414,7 @@ class WholeBodyController:
             tasks: what is wanted of ν̇.
             contacts: the points that may push.
             mass: M.
-            bias: h − J_Tᵀ T.
+            bias: h − J_Tᵀ T, and less what pushes do.
             step: row of the plan.
         """
         units, size = self._units, len(mass)

@@ -19,6 +19,7 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import Surface, frame_function
 from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.conditions import under_conditions
+from multimodal_to.trajectory.pushes import known_pushes, push_forces
 from multimodal_to.trajectory.quantities import QUANTITIES, SCALAR, Quantity, row_units
 from multimodal_to.trajectory.resampling import resample
 from multimodal_to.trajectory.trajectory import Trajectory
@@ -343,8 +344,17 @@ def at_velocities(trajectory: Trajectory) -> Trajectory:
 
 
 @checked
-def generalised_forces(robot: Robot, trajectory: Trajectory, pushed: Sequence[tuple[str, Array]] = ()) -> Array:
-    """Return what the motion asks of base and joints under all contact forces and thrusts, (6 + n, knots + 1).
+def outside_forces(trajectory: Trajectory) -> list[tuple[str, Array]]:
+    """Return the known pushes of the task that a trajectory keeps: the frame and its force [N], (3, knots + 1)."""
+    known = known_pushes(trajectory)
+    return [(push.of, force.T) for push, force in zip(known, push_forces(known, trajectory), strict=True)]
+
+
+@checked
+def generalised_forces(
+    robot: Robot, trajectory: Trajectory, pushed: Sequence[tuple[str, Array]] | None = None
+) -> Array:
+    """Return what the motion asks of base and joints under all forces that act on it, (6 + n, knots + 1).
 
     τ = M ν̇ + C ν + g − Σ Jᵀ f by RNEA: the wrench left for the base [N, N m], which is zero on a true motion, then the
     joint torques [N m]. All is at the instants of the knots: `at_knots`, `accelerations_at_knots`.
@@ -358,8 +368,9 @@ def generalised_forces(robot: Robot, trajectory: Trajectory, pushed: Sequence[tu
         robot: the robot of the trajectory.
         trajectory: the motion.
         pushed: forces from outside beside contacts and jets: the frame and the force in world axes [N],
-            (3, knots + 1).
+            (3, knots + 1); by default the known pushes of the task that the trajectory keeps.
     """
+    pushed = outside_forces(trajectory) if pushed is None else pushed
     robot = under_conditions(robot.with_jets(trajectory.jet_names), trajectory)
     count = trajectory.time.size
     names = ("base_linear_velocity", "base_angular_velocity", "joint_velocities")
