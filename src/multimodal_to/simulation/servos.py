@@ -11,6 +11,7 @@ from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.simulation.controller import Belief, Command, Servos, row_of
+from multimodal_to.simulation.footing import Footing
 from multimodal_to.simulation.look_ahead import Feedback, LookAhead
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
@@ -29,6 +30,7 @@ class ServoGains(BalanceGains):
 
     stiffness: float = 1.2  # K of each joint's servo [m g L/rad]
     damping: float = 0.16  # D of each joint's servo [m g L √(L/g)/rad]
+    placement: float = 1.0  # k: how far a foot follows the capture point [1]
     look_ahead: LookAhead = field(default_factory=LookAhead)
 
 
@@ -51,6 +53,7 @@ class ServoController:
         self._servo: tuple[Array, Array]
         self._balance: Balance
         self._feedback: Feedback
+        self._footing: Footing
 
     @property
     def period(self) -> float:
@@ -71,8 +74,16 @@ class ServoController:
         self._robot, self._since = robot, since
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
         units, gains = Units.of(robot), self._gains
-        self._balance = Balance(gains=gains, units=units, inertia=inertia(robot), friction=self._belief.friction)
+        feet = np.array([contact.foot for contact in robot.contacts], dtype=np.str_)
+        self._balance = Balance(
+            gains=gains,
+            units=units,
+            inertia=inertia(robot),
+            friction=self._belief.friction,
+            same_foot=feet[:, None] == feet,
+        )
         self._feedback = Feedback(self._belief, self._plan, PERIOD, gains.look_ahead)
+        self._footing = Footing(self._belief, self._plan, PERIOD, gains.placement)
         count = len(robot.joint_names)
         self._servo = units.servo(count, gains.stiffness, gains.damping)
         if first:
@@ -91,15 +102,16 @@ class ServoController:
         plan, step = self._plan, row_of(time - self._since, PERIOD, self._plan)
         torques, throttle = plan.torques[step], plan.throttle[step]
         if self._stabilise:
-            advice = self._feedback.advise(state, step)
+            footing = self._footing.step(step)
+            advice = self._feedback.advise(state, step, footing.place)
             throttle = around(self._robot.jets, plan, step, advice.throttle)
             simulation, data = self._belief.simulation, self._belief.data
-            correction = correct(simulation, data, plan, step, state.thrust, self._balance)
+            correction = correct(simulation, data, plan, step, state.thrust, self._balance, footing.place)
             joints = advice.joints + correction.joints
             self._shift = self._shift + (joints - self._shift) * PERIOD / JOINT_LAG
             torques = torques - self._borne_by_joints(state, step, correction.contact_forces)
         servos = Servos(
-            positions=plan.joints[step] + self._shift,
+            positions=plan.joints[step] + self._shift + (footing.joints if self._stabilise else 0.0),
             velocities=plan.joint_velocities[step],
             stiffness=self._servo[0],
             damping=self._servo[1],

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.simulation.model import SimulationModel, mujoco_module
@@ -51,6 +52,7 @@ class Balance:
     units: Units
     inertia: Array  # I about the CoM in the base's axes [kg m²], (3, 3)
     friction: float  # Coulomb's μ [1]
+    same_foot: NDArray[np.bool_]  # which contact points are of one foot, (contacts, contacts)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,7 +64,7 @@ class Correction:
 
 
 def correct(
-    simulation: SimulationModel, data: Any, plan: Reference, step: int, thrust: Array, balance: Balance
+    simulation: SimulationModel, data: Any, plan: Reference, step: int, thrust: Array, balance: Balance, shift: Array
 ) -> Correction:
     """Return what to add to row `step` of the plan in the state of `data`; nothing where no foot stands.
 
@@ -73,20 +75,19 @@ def correct(
         step: row of the plan.
         thrust: of each jet as it is [N], (jets,).
         balance: gains, and what else is known of the robot.
+        shift: by which the plan for the CoM moves, world axes [m], (3,).
     """
     robot, forces = simulation.robot, np.zeros((len(simulation.robot.contacts), 3))
     joints = np.zeros(len(robot.joint_names))
     com, points = data.subtree_com[1], data.geom_xpos[simulation.points]
     loads = np.maximum(plan.contact_forces[step][:, 2], 0.0)
-    feet = np.array([contact.foot for contact in robot.contacts], dtype=np.str_)
-    same_foot = feet[:, None] == feet
-    touches = same_foot @ np.isin(simulation.points, data.contact.geom)
-    standing = np.flatnonzero((same_foot @ loads > flight_force(robot)) & touches)  # loaded by the plan
+    touches = balance.same_foot @ simulation.touching(data)
+    standing = np.flatnonzero((balance.same_foot @ loads > flight_force(robot)) & touches)  # loaded by the plan
     if not standing.size:
         return Correction(contact_forces=forces, joints=joints)
     axes = -data.site_xmat[simulation.jets].reshape(-1, 3, 3)[:, :, 2]
     wrenches = np.hstack([axes, np.cross(data.site_xpos[simulation.jets] - com, axes)])
-    lacking = _wanted(simulation, data, plan, step, balance) - (thrust - plan.thrust[step]) @ wrenches
+    lacking = _wanted(simulation, data, plan, step, balance, shift) - (thrust - plan.thrust[step]) @ wrenches
     forces[standing] = _shared_out(plan.contact_forces[step][standing], points[standing] - com, lacking, balance)
     load = float(loads[standing].sum())
     free = max(0.0, 1.0 - load / balance.units.force)
@@ -154,7 +155,7 @@ def rotation_vector(rotation: Array) -> Array:
     return vector
 
 
-def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, balance: Balance) -> Array:
+def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, balance: Balance, shift: Array) -> Array:
     """Return Δl̇ [N] and Δḣω [N m] about the CoM, (6,).
 
     Args:
@@ -163,9 +164,10 @@ def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, 
         plan: with rows.
         step: row of the plan.
         balance: gains, and what else is known of the robot.
+        shift: by which the plan for the CoM moves, world axes [m], (3,).
     """
     gains, rate = balance.gains, balance.units.frequency
-    away, slow = plan.com[step] - data.subtree_com[1], plan.com_velocity[step] - data.subtree_linvel[1]
+    away, slow = plan.com[step] + shift - data.subtree_com[1], plan.com_velocity[step] - data.subtree_linvel[1]
     linear = simulation.robot.mass * (gains.com_stiffness * rate**2 * away + gains.com_damping * rate * slow)
     turn = rotation_vector(plan.rotation[step] @ data.xmat[1].reshape(3, 3).T)
     spin = plan.angular_momentum[step] - data.subtree_angmom[1]
