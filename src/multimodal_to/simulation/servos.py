@@ -13,9 +13,8 @@ from multimodal_to.models.state import State
 from multimodal_to.simulation.controller import Belief, Command, Servos, row_of
 from multimodal_to.simulation.footing import Footing
 from multimodal_to.simulation.look_ahead import Feedback, LookAhead
-from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
-from multimodal_to.simulation.stabiliser import Balance, BalanceGains, correct
+from multimodal_to.simulation.stabiliser import Balance, BalanceGains, Seen, correct
 from multimodal_to.simulation.turbines import around
 from multimodal_to.simulation.units import Units
 from multimodal_to.trajectory import Trajectory
@@ -30,7 +29,7 @@ class ServoGains(BalanceGains):
 
     stiffness: float = 1.2  # K of each joint's servo [m g L/rad]
     damping: float = 0.16  # D of each joint's servo [m g L √(L/g)/rad]
-    placement: float = 1.0  # k: how far a foot follows the capture point [1]
+    placement: float = 1.5  # k: how far a foot follows the capture point [1]
     look_ahead: LookAhead = field(default_factory=LookAhead)
 
 
@@ -100,41 +99,35 @@ class ServoController:
         assert self._belief is not None
         self._belief.put(state)
         plan, step = self._plan, row_of(time - self._since, PERIOD, self._plan)
-        torques, throttle = plan.torques[step], plan.throttle[step]
-        if self._stabilise:
-            footing = self._footing.step(step)
-            advice = self._feedback.advise(state, step, footing.place)
-            throttle = around(self._robot.jets, plan, step, advice.throttle)
-            simulation, data = self._belief.simulation, self._belief.data
-            correction = correct(simulation, data, plan, step, state.thrust, self._balance, footing.place)
-            joints = advice.joints + correction.joints
-            self._shift = self._shift + (joints - self._shift) * PERIOD / JOINT_LAG
-            torques = torques - self._borne_by_joints(state, step, correction.contact_forces)
-        servos = Servos(
-            positions=plan.joints[step] + self._shift + (footing.joints if self._stabilise else 0.0),
-            velocities=plan.joint_velocities[step],
-            stiffness=self._servo[0],
-            damping=self._servo[1],
+        if not self._stabilise:
+            return self._command(step, plan.joints[step], plan.torques[step], plan.throttle[step])
+        footing = self._footing.step(step)
+        advice = self._feedback.advise(state, step, footing.place)
+        joints = plan.joints[step] + self._shift + footing.joints
+        torques = plan.torques[step] - self._belief.simulation.coupling.T @ self._belief.of_thrusts(
+            state.thrust - plan.thrust[step]
         )
-        return Command(torques=torques, throttle=throttle, servos=servos)
+        servo = self._servo[0] * (joints - state.joint_positions)
+        servo += self._servo[1] * (plan.joint_velocities[step] - state.joint_velocities)
+        seen = Seen(thrust=state.thrust, shift=footing.place, asked=torques + servo)
+        correction = correct(self._belief.simulation, self._belief.data, plan, step, seen, self._balance)
+        self._shift = self._shift + (advice.joints + correction.joints - self._shift) * PERIOD / JOINT_LAG
+        throttle = around(self._robot.jets, plan, step, advice.throttle)
+        return self._command(step, joints, torques + correction.torques, throttle)
 
-    def _borne_by_joints(self, state: State, step: int, forces: Array) -> Array:
-        """Return Jᵀ f of the thrusts' difference from the plan and of the forces that are asked of the ground.
+    def _command(self, step: int, joints: Array, torques: Array, throttle: Array) -> Command:
+        """Return what servos at some joint positions, torques and throttles are together.
 
         Args:
-            state: with the thrusts as they are.
             step: row of the plan.
-            forces: that are asked of the ground beside the plan's [N], (contacts, 3).
+            joints: where the servos hold the joints [rad or m], (n,).
+            torques: beside the servos [N m or N], (n,).
+            throttle: of the jets [%], (jets,).
         """
-        assert self._belief is not None
-        mujoco, data, simulation = mujoco_module(), self._belief.data, self._belief.simulation
-        total = self._belief.of_thrusts(state.thrust - self._plan.thrust[step])
-        jacobian = np.zeros((3, simulation.model.nv))
-        for index, force in enumerate(forces):
-            if force.any():
-                mujoco.mj_jacGeom(simulation.model, data, jacobian, None, simulation.points[index])
-                total += jacobian.T @ force
-        return np.asarray(simulation.coupling.T @ total)
+        stiffness, damping = self._servo
+        velocities = self._plan.joint_velocities[step]
+        servos = Servos(positions=joints, velocities=velocities, stiffness=stiffness, damping=damping)
+        return Command(torques=torques, throttle=throttle, servos=servos)
 
 
 @checked
