@@ -2,10 +2,10 @@
 
 A robot that was pushed comes down somewhere else, and turned. A foot that is in the air and will soon be loaded goes to
 
-    c = c* + k d,   d = x − x* + (ẋ − ẋ*) (t + √(L/g)),
+    c = c* + r a + k d,   d = x − x* − a + (ẋ − ẋ*) (t + √(L/g)),
 
-level as the plan has it, although the base is not: d is how far the capture point will be off the plan when the foot
-comes down, t the time until then if no foot stands and zero if one does. Leg joints turn by J⁺ of what that changes of
+level as the plan has it, although the base is not: d is how far the capture point will be off when the foot comes down,
+t the time until then if no foot stands and zero if one does, and a how far the feet that stand are off. Leg joints turn by J⁺ of what that changes of
 the foot in the base's frame.
 
 Where feet stand beside their planned places, by o each, the plan for the CoM moves with them: by a, the mean of o under
@@ -28,8 +28,10 @@ from multimodal_to.simulation.stabiliser import rotation_vector
 from multimodal_to.simulation.units import Units
 
 SOON = 0.3  # how long before it is loaded a foot is led to its place [s]
-LOADED = 0.002  # a foot with more planned load than this is to stand [m g]
+LOADED = 0.01  # a foot with more planned load than this is to stand [m g]
 FURTHEST = 0.25  # that a foot comes down off the plan [L]
+RETURN = 0.8  # share of a that a foot that comes down keeps [1]
+SETTLING = 0.1  # after it has come down a foot is where it stands [s]
 TURN_MAX = 0.5  # how far a leg's joint leaves the plan [rad or m]
 SOFT = 0.03  # of the legs' pseudo-inverse, against straight knees [1]
 SWING_LAG, STANCE_LAG = 0.03, 0.1  # with which the legs take over what is wanted of a foot in the air, on the ground [s]
@@ -64,6 +66,8 @@ class Footing:
             later = self._until[:, row + 1] + period if row + 1 < steps else np.inf
             self._until[:, row] = np.where(loaded[:, row], 0.0, later)
         self._anchor, self._wanted = np.zeros(3), np.zeros((len(self._feet.members), count))
+        self._down = np.full(len(loaded), np.inf)  # the row of the plan at which each foot has come down
+        self._offset = np.zeros((len(loaded), 3))  # o of each foot
 
     def step(self, step: int) -> Step:
         """Return what the feet change of a row of the plan, in the state that `belief` has taken over."""
@@ -72,18 +76,26 @@ class Footing:
         positions = data.geom_xpos[self._belief.simulation.points]
         places = [positions[own].mean(axis=0) for own in feet.members]
         until = self._until[:, step]
-        stands = np.array([touching[own].any() for own in feet.members], dtype=bool) & (until < SOON)
-        offsets = np.array([place - feet.middle[foot, step] for foot, place in enumerate(places)]).reshape(-1, 3)
-        offsets[:, 2] = 0.0
-        loads = np.where(stands, np.maximum(feet.load[:, step], 1e-3 * self._units.force), 0.0)
-        wanted = loads @ offsets / loads.sum() if stands.any() else np.zeros(3)
+        for foot, own in enumerate(feet.members):
+            touches = bool(touching[own].any())
+            if until[foot] > 0.0 and not touches:
+                self._down[foot] = np.inf
+            elif touches and until[foot] < SOON:
+                self._down[foot] = min(self._down[foot], step)
+            if step - self._down[foot] < SETTLING / period:
+                self._offset[foot, :2] = (places[foot] - feet.middle[foot, step])[:2]
+        down = np.isfinite(self._down)
+        loads = np.where(down, np.maximum(feet.load[:, step], 1e-3 * self._units.force), 0.0)
+        wanted = loads @ self._offset / loads.sum() if down.any() else np.zeros(3)
         self._anchor = self._anchor + (wanted - self._anchor) * period / STANCE_LAG
         for foot, place in enumerate(places):
             lag, change = SWING_LAG, np.zeros(6)
-            if stands[foot]:
-                lag, change[:3] = STANCE_LAG, offsets[foot] - self._anchor
+            if down[foot]:  # also one that lost the ground: else feet that bounce walk away
+                lag, change[:3] = STANCE_LAG, self._offset[foot] - self._anchor
             elif until[foot] < SOON:
-                change = self._coming_down(foot, step, 0.0 if stands.any() else float(until[foot]))
+                if down.any():
+                    continue
+                change = self._coming_down(foot, step, float(until[foot]))
             joints = self._of_joints(foot, place, change) if change.any() else 0.0
             self._wanted[foot] += (joints - self._wanted[foot]) * period / lag
         return Step(place=self._anchor, joints=np.clip(self._wanted.sum(axis=0), -TURN_MAX, TURN_MAX))
@@ -97,9 +109,9 @@ class Footing:
             until: how long the robot flies until it comes down [s].
         """
         plan, data = self._plan, self._belief.data
-        away = data.subtree_com[1] - plan.com[step]
+        away = data.subtree_com[1] - plan.com[step] - self._anchor
         away = away + (data.subtree_linvel[1] - plan.com_velocity[step]) * (until + 1.0 / self._units.frequency)
-        away = self._placement * away * [1.0, 1.0, 0.0]
+        away = RETURN * self._anchor + self._placement * away * [1.0, 1.0, 0.0]
         far, size = FURTHEST * self._units.length, float(np.linalg.norm(away))
         target = self._feet.middle[foot, step] + away * min(1.0, far / max(size, 1e-9))
         turn = self._belief.rotation @ plan.rotation[step].T
