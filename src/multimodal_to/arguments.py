@@ -37,11 +37,17 @@ def checked(function: Function) -> Function:
     """
     signature = inspect.signature(function)
     said = function.__qualname__.split(".")[-2 if function.__name__ == "__init__" else -1]
+    names = tuple(signature.parameters)
+    simple = all(one.kind is inspect.Parameter.POSITIONAL_OR_KEYWORD for one in signature.parameters.values())
 
     @wraps(function)
     def checking(*given: Any, **named: Any) -> Any:
         hints = _hints(function)
-        for name, value in signature.bind(*given, **named).arguments.items():
+        if simple and not named and len(given) == len(names):  # as `bind` does, in a tenth of its time
+            arguments = dict(zip(names, given, strict=True))
+        else:
+            arguments = signature.bind(*given, **named).arguments
+        for name, value in arguments.items():
             kind = signature.parameters[name].kind
             values = value if kind is inspect.Parameter.VAR_POSITIONAL else (value,)
             for one in values:
@@ -126,8 +132,13 @@ def _hints(annotated: Hashable) -> dict[str, Any]:
         return {}
 
 
+@cache
+def _parts(annotation: Hashable) -> tuple[Any, tuple[Any, ...]]:
+    return get_origin(annotation), get_args(annotation)
+
+
 def _fits(value: object, annotation: Any) -> bool:
-    origin, inner = get_origin(annotation), get_args(annotation)
+    origin, inner = _parts(annotation)
     if origin is Literal:
         return isinstance(value, str) and value in inner
     if origin in (Union, types.UnionType):
@@ -184,7 +195,7 @@ def _members(protocol: type) -> list[str]:
 
 
 def _said(annotation: Any) -> str:
-    origin, inner = get_origin(annotation), get_args(annotation)
+    origin, inner = _parts(annotation)
     if origin is Literal:
         return f"one of {', '.join(inner)}"
     if origin in (Union, types.UnionType):

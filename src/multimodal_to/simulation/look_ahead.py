@@ -95,7 +95,7 @@ class Feedback:
         self._forgetting = FORGETTING.of(belief.simulation.robot.units)
         self._sums = np.zeros(6)
 
-    def advise(self, state: State, step: int) -> Advice:
+    def advise(self, state: State, step: int, shift: Array | None = None) -> Advice:
         """Return what is added to a row of the plan.
 
         The attitude in ξ is that of the whole robot, whose angular velocity is I⁻¹ hω: the base's, and what the joints
@@ -109,7 +109,7 @@ class Feedback:
         stands = bool(data.ncon)
         gains = self._standing if stands else self._flying
         row = min(round(step / self._every), len(gains.turning) - 1)
-        place = data.subtree_com[1] - plan.com[step]
+        place = data.subtree_com[1] - plan.com[step] - (0.0 if shift is None else shift)
         turn = rotation_vector(self._belief.rotation @ plan.rotation[step].T)
         turn = turn + gains.turning[row] @ (state.joint_positions - plan.joints[step])
         rate = -self._sums / self._forgetting if stands else np.concatenate([place, turn])

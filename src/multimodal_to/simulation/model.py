@@ -8,7 +8,7 @@ where d(p) = 0. Nothing else of the robot touches anything.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -67,6 +67,7 @@ class SimulationModel:
     joint_positions: NDArray[np.int64]  # of s in qpos, (n,)
     joint_velocities: NDArray[np.int64]  # of ṡ in qvel, (n,)
     coupling: Array  # G: the joints in qvel move with G ṡ, followers too; forces on them are Gᵀ f for s, (nv, n)
+    offsets: Array  # the joints in qpos are at these plus G s [rad or m], (nv − 6,)
     points: NDArray[np.int64]  # geom of each contact point, (contacts,)
     jets: NDArray[np.int64]  # site of each jet, (jets,)
     notes: tuple[str, ...]  # what differs from the URDF, a sentence each
@@ -93,8 +94,9 @@ class SimulationModel:
         """
         turn = np.zeros(9)
         data.qpos[:3], data.qpos[3:7] = position, quaternion_xyzw[[3, 0, 1, 2]] / np.linalg.norm(quaternion_xyzw)
-        for name, value in self._moving(self.robot.kindyn.tree.joint_values(joints)).items():
-            data.qpos[self.model.joint(name).qposadr[0]] = value
+        if joints.shape != (self.coupling.shape[1],):
+            raise InputError(f"'joints' has the shape {joints.shape}; expected ({self.coupling.shape[1]},)")
+        data.qpos[7:] = self.offsets + self.coupling[6:] @ joints
         mujoco_module().mju_quat2Mat(turn, data.qpos[3:7])
         data.qvel[:3], data.qvel[3:6] = velocity[:3], turn.reshape(3, 3).T @ velocity[3:]
         data.qvel[6:] = (self.coupling @ joint_velocities)[6:]
@@ -110,9 +112,12 @@ class SimulationModel:
         count = len(self.robot.joint_names)
         self.model.actuator_biasprm[:count, 1], self.model.actuator_biasprm[:count, 2] = -stiffness, -damping
 
-    def _moving(self, values: Mapping[str, Array]) -> dict[str, Array]:
-        tree = self.robot.kindyn.tree
-        return {name: values[name] for name in (*tree.joint_names, *tree.followers)}
+    @checked
+    def touching(self, data: Any) -> NDArray[np.bool_]:
+        """Return which contact points touch the ground in the state of MuJoCo's `MjData` of this model, (contacts,)."""
+        touches = np.zeros(self.model.ngeom, dtype=bool)
+        touches[data.contact.geom] = True
+        return np.asarray(touches[self.points])
 
 
 @checked
@@ -185,6 +190,7 @@ def build_model(
         joint_positions=_integers(model.joint(name).qposadr[0] for name in robot.joint_names),
         joint_velocities=_integers(model.joint(name).dofadr[0] for name in robot.joint_names),
         coupling=_coupling(model, robot),
+        offsets=_offsets(model, robot),
         points=_integers(model.geom(name).id for name in robot.contact_names),
         jets=_integers(model.site(name).id for name in robot.jet_names),
         notes=notes,
@@ -203,6 +209,14 @@ def _coupling(model: Any, robot: Robot) -> Array:
     for name, how in tree.followers.items():
         coupling[model.joint(name).dofadr[0], robot.joint_names.index(how.joint)] = how.multiplier
     return coupling
+
+
+def _offsets(model: Any, robot: Robot) -> Array:
+    """Return where the joints in qpos are while s is zero, (nv − 6,): followers may be off it."""
+    offsets = np.zeros(model.nv - 6)
+    for name, how in robot.kindyn.tree.followers.items():
+        offsets[model.joint(name).dofadr[0] - 6] = how.offset
+    return offsets
 
 
 def _add_couplings(mujoco: ModuleType, spec: Any, robot: Robot) -> None:
