@@ -3,9 +3,9 @@
 python benchmarks/sweep_kills.py SWEEP.toml FOLDER [KILLS] [WORKERS]   (10 kills and 2 workers; Linux)
 
 Each kill is a SIGKILL some time after a drawn number of plans is done: in turns of one worker, and of the driver, which
-is started again. All the while every file of every plan is watched: none may change once its row is there. Exit status 0
-when every plan has a row and a trajectory that loads, and nothing was written twice. A draft that a kill cut short may be
-left; nothing reads it.
+is started again. All the while every file of every plan is watched: none may change once its row is there. Exit status
+0 when every plan has a row and a trajectory that loads, and nothing was written twice. A draft that a kill cut short
+may be left; nothing reads it.
 """
 
 import os

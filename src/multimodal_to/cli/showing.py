@@ -113,7 +113,7 @@ def replay(
     targets = {suffix: path for suffix, path in wanted.items() if path is not None}
     for suffix, path in targets.items():
         writable_file(path, suffix)
-    from multimodal_to.replay import show, write_gif, write_html, write_mp4, write_snapshots
+    from multimodal_to.replay import serve, write_gif, write_html, write_mp4, write_snapshots
 
     write = {
         ".html": lambda path: write_html(the_robot, trajectory, path, ghost=ghost, meshes=meshes),
@@ -129,7 +129,7 @@ def replay(
         out.print(f"wrote {write[suffix](path)}", soft_wrap=True)
     if targets:
         return
-    visualizer = show(the_robot, trajectory, ghost=ghost, meshes=meshes)
+    visualizer = serve(the_robot, trajectory, ghost=ghost, meshes=meshes)
     out.print(f"replaying at {visualizer.url()}; Ctrl-C ends", soft_wrap=True)
     visualizer.open()
     try:
