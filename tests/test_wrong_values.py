@@ -70,7 +70,7 @@ def test_a_motion_of_another_robot_is_not_shown(robot, tmp_path):
     for show in (
         lambda: replay.write_html(other, at_rest(robot), tmp_path / "page.html"),
         lambda: replay.write_still_html(other, at_rest(robot), [0.0], tmp_path / "page.html", aspect=1.0),
-        lambda: replay.embed(other, at_rest(robot)),
+        lambda: replay.show(other, at_rest(robot)),
         lambda: replay.player(other, at_rest(robot)),
     ):
         with pytest.raises(InputError, match="is for another robot: its joints are hip, mast, wheel"):

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from multimodal_to import replay, scenarios
-from multimodal_to.errors import InputError, OutputError
+from multimodal_to.errors import InputError, OutputError, TrajectoryError
 from multimodal_to.models.terrain import Stairs
 from multimodal_to.replay.browser import find_browser, open_browser
 from multimodal_to.scenarios.data import to_json
@@ -30,7 +30,7 @@ def shown(ironcub, trajectory, tmp_path_factory):
     if find_browser() is None:
         pytest.skip("no Chromium or Chrome is installed")
     page = replay.write_html(ironcub, trajectory, tmp_path_factory.mktemp("page") / "replay.html")
-    assert page.stat().st_size < 15e6
+    assert page.stat().st_size < 3e6
     with open_browser((500, 400)) as browser:
         browser.open(page)
         browser.evaluate("replay.run(false)")  # drawing without end takes a processor
@@ -170,7 +170,7 @@ def test_ghosts_that_climb_stand_side_by_side_and_need_no_room_along_their_way(i
 
 @needs_browser
 def test_a_replay_plays_in_the_frame_of_a_notebook(ironcub, trajectory, tmp_path):
-    cell = replay.embed(ironcub, trajectory, meshes=False, height=300)
+    cell = trajectory.show(ironcub, meshes=False, height=300)
     (tmp_path / "notebook.html").write_text(
         f"<!DOCTYPE html><body>{cell._repr_html_()}<script>let replay = {{}};</script></body>", encoding="utf-8"
     )
@@ -185,6 +185,14 @@ def test_a_replay_plays_in_the_frame_of_a_notebook(ironcub, trajectory, tmp_path
         assert browser.errors == []
 
 
+def test_a_notebook_shows_a_motion_of_a_bundled_robot_without_being_given_the_robot(ironcub, trajectory):
+    found, asked = trajectory.show(meshes=False), replay.show(ironcub, trajectory, meshes=False)
+    scene = [cell.page.split("const scene = ")[1].splitlines()[0] for cell in (found, asked)]
+    assert scene[0] == scene[1]
+    with pytest.raises(TrajectoryError, match="is not bundled"):
+        replace(trajectory, robot="../ironcub").show()
+
+
 def test_a_frame_without_height_is_refused(ironcub, trajectory):
     with pytest.raises(InputError, match="height of the frame is 0"):
-        replay.embed(ironcub, trajectory, meshes=False, height=0)
+        replay.show(ironcub, trajectory, meshes=False, height=0)

@@ -321,7 +321,7 @@ def test_a_page_that_cannot_be_written_says_where(robot, trajectory, tmp_path):
 
 
 def test_the_live_viewer_serves_the_same_scene_without_a_word(robot, trajectory, stage, capfd):
-    visualizer = replay.show(robot, trajectory, meshes=False)
+    visualizer = replay.serve(robot, trajectory, meshes=False)
     try:
         assert visualizer.url().startswith("http://127.0.0.1:")
         served = visualizer.static_html()

@@ -113,7 +113,7 @@ def replay(
     targets = {suffix: path for suffix, path in wanted.items() if path is not None}
     for suffix, path in targets.items():
         writable_file(path, suffix)
-    from multimodal_to.replay import show, write_gif, write_html, write_mp4, write_snapshots
+    from multimodal_to.replay import serve, write_gif, write_html, write_mp4, write_snapshots
 
     write = {
         ".html": lambda path: write_html(the_robot, trajectory, path, ghost=ghost, meshes=meshes),
@@ -129,7 +129,7 @@ def replay(
         out.print(f"wrote {write[suffix](path)}", soft_wrap=True)
     if targets:
         return
-    visualizer = show(the_robot, trajectory, ghost=ghost, meshes=meshes)
+    visualizer = serve(the_robot, trajectory, ghost=ghost, meshes=meshes)
     out.print(f"replaying at {visualizer.url()}; Ctrl-C ends", soft_wrap=True)
     visualizer.open()
     try:
@@ -189,7 +189,9 @@ def _carried(robot: Robot, plan: Trajectory) -> Carried | None:
 @app.command("export")
 def export_file(
     file: File,
-    to: Annotated[str, typer.Option("--to", help="csv, mat, mujoco, pinocchio or motion.", autocompletion=exports)],
+    to: Annotated[
+        str, typer.Option("--to", help="csv, mat, mujoco, pinocchio, rerun or motion.", autocompletion=exports)
+    ],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write. [FILE.csv and so on]")] = None,
     flavour: Annotated[
         str | None,
@@ -226,7 +228,9 @@ def export_file(
     the_robot, trajectory = loaded(file, robot)
     suffix = FLAVOURS[flavour].suffix if flavour else EXPORTS[to][0]
     target = output or (
-        file.with_suffix(suffix) if to in ("csv", "mat") else file.with_name(f"{file.stem}-{flavour or to}{suffix}")
+        file.with_suffix(suffix)
+        if to in ("csv", "mat", "rerun")
+        else file.with_name(f"{file.stem}-{flavour or to}{suffix}")
     )
     writable_file(target, suffix)
     if flavour:

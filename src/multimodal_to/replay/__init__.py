@@ -5,17 +5,18 @@ two of them the viewer moves positions linearly and turns rotations about a fixe
 linearly and the links stay together.
 """
 
-from multimodal_to.replay.embedding import Embedded, embed
-from multimodal_to.replay.live import show
+from multimodal_to.replay.embedding import Embedded, show
+from multimodal_to.replay.live import serve
 from multimodal_to.replay.meshes import MeshWarning
-from multimodal_to.replay.page import player, write_html, write_still_html
+from multimodal_to.replay.page import packed, player, write_html, write_still_html
 from multimodal_to.replay.pictures import snapshot_times, write_gif, write_mp4, write_snapshots
 
 __all__ = [
     "Embedded",
     "MeshWarning",
-    "embed",
+    "packed",
     "player",
+    "serve",
     "show",
     "snapshot_times",
     "write_gif",

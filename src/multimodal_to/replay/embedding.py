@@ -10,6 +10,7 @@ from multimodal_to.errors import InputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.replay.page import page
 from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory.conditions import robot_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,13 +35,20 @@ class Embedded:
 
 
 @checked
-def embed(robot: Robot, trajectory: Trajectory, *, meshes: bool = True, height: int = 520) -> Embedded:
-    """Return the replay as a notebook shows it, in a frame of that height [pixel]; with meshes it has some 2 MB.
+def show(robot: Robot | None, trajectory: Trajectory, *, meshes: bool = True, height: int = 520) -> Embedded:
+    """Return the replay as a notebook shows it where it is the value of a cell, in a frame of its own.
+
+    It fetches nothing, and has 3 MB at most for the bundled robots.
 
     Args:
-        robot: that moves.
+        robot: that moves; None: the bundled one that the trajectory names.
         trajectory: its motion.
         meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
         height: of the frame [pixel].
+
+    Raises:
+        InputError: the height is not positive, or the trajectory is for another robot.
+        TrajectoryError: there is no robot, and the trajectory names none that is bundled.
     """
-    return Embedded(page=page(robot, trajectory, meshes=meshes), height=height)
+    found = robot_of(trajectory) if robot is None else robot
+    return Embedded(page=page(found, trajectory, meshes=meshes), height=height)

@@ -21,7 +21,7 @@ from multimodal_to.trajectory import Trajectory
 
 
 @checked
-def show(
+def serve(
     robot: Robot, trajectory: Trajectory, *, ghost: Trajectory | None = None, meshes: bool = True
 ) -> meshcat.Visualizer:
     """Start meshcat's server, draw the motion there and return the visualizer; a browser at its `url()` plays it.

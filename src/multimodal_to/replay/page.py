@@ -188,7 +188,7 @@ def _player(
         credit=f'<div class="panel credit">{html.escape(attribution)}</div>' if attribution else "",
         bands="".join(bands),
         duration=f"{trajectory.duration:.6f}",
-        packed=_packed([_VIEWER.read_bytes(), *recorder.commands]),
+        packed=packed(b"".join([_VIEWER.read_bytes(), *recorder.commands])),
         scene=_json(_content(trajectory, recorder, picture)),
     )
 
@@ -207,9 +207,10 @@ def _content(trajectory: Trajectory, recorder: Recorder, picture: Picture) -> di
     }
 
 
-def _packed(parts: list[bytes]) -> str:
-    """Return bytes one after the other, compressed, as text: the viewer and the scene take a third so."""
-    return base64.b64encode(gzip.compress(b"".join(parts), mtime=0)).decode("ascii")
+@checked
+def packed(data: bytes) -> str:
+    """Return bytes, compressed, as text that a page unpacks: a third of them, or less."""
+    return base64.b64encode(gzip.compress(data, mtime=0)).decode("ascii")
 
 
 def _title(trajectory: Trajectory) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import html
 import io
 import os
@@ -22,7 +21,7 @@ from multimodal_to.auditing.findings import Finding
 from multimodal_to.files.writing import write_text
 from multimodal_to.models.robot import Robot
 from multimodal_to.plotting import FIGURES, plot, plot_margins
-from multimodal_to.replay import player
+from multimodal_to.replay import packed, player
 from multimodal_to.scenarios.files import to_toml
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory
@@ -202,10 +201,9 @@ def _figure(name: str, robot: Robot, trajectory: Trajectory, report: Audit) -> s
     stream = io.BytesIO()
     figure.savefig(stream, format="svg")
     width, height = figure.get_size_inches()
-    data = base64.b64encode(stream.getvalue()).decode("ascii")
     caption = html.escape(_CAPTIONS[name])
     tall = ' class="tall"' if height > width else ""
-    image = f'<img alt="{caption}" src="data:image/svg+xml;base64,{data}">'
+    image = f'<img alt="{caption}" data-packed="{packed(stream.getvalue())}">'
     return f"<figure{tall}><figcaption>{caption}</figcaption>{image}</figure>"
 
 

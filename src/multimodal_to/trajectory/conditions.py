@@ -17,7 +17,7 @@ import numpy as np
 from multimodal_to.arguments import checked
 from multimodal_to.errors import TrajectoryError, shown
 from multimodal_to.files.reading import is_number
-from multimodal_to.models.robot import Robot
+from multimodal_to.models.robot import Robot, bundled_robots, load_robot
 from multimodal_to.trajectory.trajectory import Trajectory
 
 _SAME = 1e-9
@@ -46,6 +46,23 @@ def under_conditions(robot: Robot, trajectory: Trajectory) -> Robot:
     if np.array_equal(gravity, robot.gravity) and friction == robot.friction:
         return robot
     return replace(robot.with_gravity(gravity), friction=float(friction))
+
+
+@checked
+def robot_of(trajectory: Trajectory) -> Robot:
+    """Return the bundled robot that a trajectory names, with its jets and under its conditions.
+
+    A trajectory may name a folder, which is not followed: files of others are to be no way to read what is here.
+
+    Raises:
+        TrajectoryError: it names none that is bundled, or keeps conditions that are none.
+    """
+    if trajectory.robot not in bundled_robots():
+        raise TrajectoryError(
+            f"the trajectory is of '{trajectory.robot}', which is not bundled; "
+            "expected the robot as well: show(load_robot(FOLDER), ...)"
+        )
+    return under_conditions(load_robot(trajectory.robot).with_jets(trajectory.jet_names), trajectory)
 
 
 @checked

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import LONGEST, InputError, TrajectoryError, listed, shortened, unknown
 from multimodal_to.files.writing import whole
 from multimodal_to.models.attitude import continuous
+from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.archive import numbers, read_archive, refuse_missing, text, texts
 from multimodal_to.trajectory.format import ENTRIES, FORMAT_VERSION, FORMATS
@@ -181,6 +183,22 @@ class Trajectory(Value):
     def vertical_contact_force(self) -> Array:
         """Return the sum of the world-vertical contact forces [N], (knots + 1,)."""
         return np.asarray(self.per_contact("contact_forces")[:, 2].sum(axis=0))
+
+    @checked
+    def show(self, robot: Robot | None = None, *, meshes: bool = True, height: int = 520) -> Any:
+        """Return the replay of the motion, which a notebook shows where it is the value of a cell: `replay.show`.
+
+        Args:
+            robot: that moves; by default the bundled one that the trajectory names.
+            meshes: draw meshes where the robot has them; else boxes, cylinders and spheres alone.
+            height: of the frame [pixel].
+
+        Raises:
+            InputError: the height is not positive, or the trajectory is for another robot.
+            TrajectoryError: no robot is given, and the trajectory names none that is bundled.
+        """
+        replay: Any = import_module("multimodal_to.replay")  # the one look up from here, for who has but a motion
+        return replay.show(robot, self, meshes=meshes, height=height)
 
     @checked
     def save(self, path: str | os.PathLike[str]) -> Path:
