@@ -10,10 +10,11 @@ from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.contacts import ContactState
 from multimodal_to.scenarios.gaits import GaitKind, GaitPlan, groups_of
-from multimodal_to.scenarios.keyframes import END, HOME, Keyframe, Momentum
+from multimodal_to.scenarios.keyframes import HOME, Keyframe, Momentum
 from multimodal_to.scenarios.scenario import Margins, Scenario, Terminal
 from multimodal_to.tasks.costs import weights
 from multimodal_to.tasks.given import given, positive, refuse_footless
+from multimodal_to.trajectory.instants import END
 
 DEPTH, HEIGHT = 0.2, 0.15
 """How far a robot squats and jumps by default [L]."""
