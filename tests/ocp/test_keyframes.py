@@ -72,8 +72,9 @@ def test_a_term_at_chosen_knots_and_intervals_has_rows_there_and_nowhere_else(ho
     x = np.random.default_rng(0).normal(size=problem.guess.size)
     z = problem.layout.read_horizon(x * problem.scale)["com_position"][2]
     values = problem.rows_at(x)
-    assert values[problem.rows["squared"].index] == pytest.approx(z[[2, 5]] ** 2)
-    assert values[problem.rows["climb"].index] == pytest.approx([z[2] * z[3]])
+    squares, products = problem.rows["squared"], problem.rows["climb"]
+    assert values[squares.index] * squares.scale == pytest.approx(z[[2, 5]] ** 2)
+    assert values[products.index] * products.scale == pytest.approx([z[2] * z[3]])
     assert problem.costs(x)["height"] == pytest.approx(3.0 * z[4] ** 2)
 
 
