@@ -1,6 +1,6 @@
 """Any robot, nothing tuned: `robot init` on URDFs of others, then every starter task, as tables in Markdown.
 
-    python benchmarks/tasks.py [ROBOT ...] [--task TASK ...] [--keep DIR] [--into docs/tasks.md]
+    python benchmarks/tasks.py [ROBOT ...] [--task TASK ...] [--jobs N] [--keep DIR] [--into docs/tasks.md]
 
 Needs the packages `example-robot-data` and `icub-models`. Of each robot only its URDF is given, and of a drone
 the links of its engines. Seconds are processor time of the solve; iterations do not depend on the machine. `--keep`
@@ -13,7 +13,9 @@ import argparse
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import multimodal_to as mt
@@ -107,31 +109,28 @@ def tried(name: str, robot: mt.Robot, task: str, keep: Path) -> Row:
     return Row(cells=cells, good=solution.status.solved and not wrong)
 
 
-def all_of(names: Sequence[str], tasks: Sequence[str], keep: Path) -> tuple[list[Row], dict[str, dict[str, list[str]]]]:
-    """Try tasks with robots; return what was tried, and the tasks that were refused by reason, for each robot.
+def all_of(name: str, tasks: Sequence[str], keep: Path) -> tuple[list[Row], dict[str, list[str]]]:
+    """Try tasks with a robot; return what was tried, and the tasks that were refused by reason.
 
     Args:
-        names: of robots.
+        name: of the robot.
         tasks: names of starter tasks.
         keep: folder for robots and motions.
     """
-    rows, refused = list[Row](), dict[str, dict[str, list[str]]]()
-    for name in names:
-        reasons = refused.setdefault(name, {})
+    rows, reasons = list[Row](), dict[str, list[str]]()
+    try:
+        urdf = _example(URDFS[name]) if URDFS[name] else _icub()
+        robot = mt.robots.init(urdf, keep / name, jets=JETS.get(name, ())).robot
+    except mt.MultimodalError as error:
+        return rows, {f"`robot init`: {error}": list(tasks)}
+    for task in tasks:
         try:
-            urdf = _example(URDFS[name]) if URDFS[name] else _icub()
-            robot = mt.robots.init(urdf, keep / name, jets=JETS.get(name, ())).robot
+            rows.append(tried(name, robot, task, keep))
         except mt.MultimodalError as error:
-            reasons[f"`robot init`: {error}"] = list(tasks)
-            continue
-        for task in tasks:
-            try:
-                rows.append(tried(name, robot, task, keep))
-            except mt.MultimodalError as error:
-                reasons.setdefault(str(error).replace(f"'{task}'", "it"), []).append(task)
-            else:
-                print("| " + " | ".join(rows[-1].cells) + " |", flush=True)
-    return rows, refused
+            reasons.setdefault(str(error).replace(f"'{task}'", "it"), []).append(task)
+        else:
+            print("| " + " | ".join(rows[-1].cells) + " |", flush=True)
+    return rows, reasons
 
 
 def markdown(rows: Sequence[Row], refused: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
@@ -165,13 +164,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("robots", nargs="*", help=f"of {', '.join(URDFS)}; default: all")
     parser.add_argument("--task", nargs="+", default=list(mt.tasks.TASKS), help=f"of {', '.join(mt.tasks.TASKS)}")
+    parser.add_argument("--jobs", type=int, default=1, help="how many robots at once")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="write robots and motions there")
     parser.add_argument("--into", type=Path, metavar="PAGE", help="also set the tables between the marks of a page")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         keep = chosen.keep or Path(scratch)
         keep.mkdir(parents=True, exist_ok=True)
-        text = markdown(*all_of(chosen.robots or list(URDFS), chosen.task, keep))
+        names = chosen.robots or list(URDFS)
+        with ProcessPoolExecutor(chosen.jobs) as pool:
+            found = dict(zip(names, pool.map(partial(all_of, tasks=chosen.task, keep=keep), names), strict=True))
+        rows = [row for some, _ in found.values() for row in some]
+        text = markdown(rows, {name: reasons for name, (_, reasons) in found.items()})
     print(f"\n{text}")
     if chosen.into:
         put(chosen.into, text)

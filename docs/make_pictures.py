@@ -1,4 +1,6 @@
-"""Draw the pictures of the README and set its table of results: python docs/make_pictures.py.
+"""Draw the pictures of the README and set its table of results: python docs/make_pictures.py [--gallery].
+
+With --gallery it solves the starter tasks of `GALLERY` and draws only the pictures of docs/gallery.md.
 
 Both come from what `multimodal-to reproduce` wrote to results/, and the snapshots of `OF_EXAMPLES` from what examples
 wrote there. The README has the first of the two tables, with its note; docs/results.md has both. Needs Chromium
@@ -6,6 +8,7 @@ wrote there. The README has the first of the two tables, with its note; docs/res
 icub-models (`pip install '.[meshes]'`).
 """
 
+import sys
 from pathlib import Path
 
 from PIL import Image
@@ -23,20 +26,50 @@ OF_EXAMPLES = {
     "trot": "solo12",
 }
 """The robots of the examples that have a picture, by what their results are called."""
+GALLERY = {
+    "solo12": ("squat", "jump", "step", "walk", "trot"),
+    "talos": ("squat", "jump", "step", "walk"),
+    "quadrotor": ("take-off", "hover", "land"),
+    "ironcub-mk3": ("squat", "step", "hover", "land"),
+}
+"""Starter tasks of bundled robots that have a picture in the gallery."""
+GALLERY_HEIGHT = 260
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
 
 
-def draw_snapshots(robot: mt.Robot, trajectory: mt.Trajectory, name: str) -> None:
-    """Write docs/NAME-snapshots.png: the robot at several times, small enough for a page that shows all scenarios."""
+def draw_snapshots(robot: mt.Robot, trajectory: mt.Trajectory, name: str, height: int = HEIGHT) -> None:
+    """Write docs/NAME-snapshots.png: the robot at several times, small enough for a page that shows all scenarios.
+
+    Args:
+        robot: that moves.
+        trajectory: how.
+        name: of the picture.
+        height: of the picture.
+    """
     path = write_snapshots(robot.with_jets(trajectory.jet_names), trajectory, ROOT / "docs" / f"{name}-snapshots.png")
     with Image.open(path) as picture:
-        size = (round(HEIGHT * picture.width / picture.height), HEIGHT)
+        size = (round(height * picture.width / picture.height), height)
         small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS)
     small.quantize(COLOURS, kmeans=4, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
+def draw_gallery() -> None:
+    """Write docs/gallery/ROBOT-TASK-snapshots.png; a task without an answer ends it."""
+    (ROOT / "docs" / "gallery").mkdir(exist_ok=True)
+    for name, tasks in GALLERY.items():
+        robot = mt.load_robot(name)
+        for task in tasks:
+            solution = mt.solve(mt.build(robot, mt.tasks.TASKS[task](robot)))
+            if not solution.status.solved:
+                raise SystemExit(f"{name}, {task}: {solution.status.value}")
+            draw_snapshots(robot, solution.trajectory, f"gallery/{name}-{task}", GALLERY_HEIGHT)
+
+
 def main() -> None:
     """Write docs/take-off.png, docs/*-snapshots.png, docs/*-forces.png, and the tables between the marks."""
+    if sys.argv[1:] == ["--gallery"]:
+        draw_gallery()
+        return
     robot = mt.load_robot("ironcub")
     for name in ("take-off", "take-off-and-landing", "walk-to-fly", "jump"):
         trajectory = mt.Trajectory.load(RESULTS / name / "trajectory.npz")

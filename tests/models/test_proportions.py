@@ -28,7 +28,7 @@ def quadruped(tmp_path):
 
 def test_the_ironcub_keeps_the_numbers_of_its_file(ironcub):
     assert ironcub.contact_reach.tolist() == [0.3, 0.3, 0.6]
-    assert ironcub.turned_reach.tolist() == [0.5, 0.5, 0.5]
+    assert ironcub.jet_reach.tolist() == [0.5, 0.5, 0.5]
     assert (ironcub.gait.lift, ironcub.gait.swing) == (0.04, 0.65)
 
 
@@ -40,7 +40,7 @@ def test_the_defaults_of_the_ironcub_are_of_the_size_of_its_numbers(ironcub, tmp
     bare = load_robot(tmp_path)
     assert bare.standing_height == pytest.approx(0.5765, abs=1e-4)
     np.testing.assert_allclose(bare.contact_reach, ironcub.contact_reach, rtol=0.21)
-    np.testing.assert_allclose(bare.turned_reach, ironcub.turned_reach, rtol=0.06)
+    np.testing.assert_allclose(bare.jet_reach, ironcub.jet_reach, rtol=0.06)
     assert bare.gait.lift == pytest.approx(ironcub.gait.lift, rel=0.02)
 
 
@@ -59,8 +59,8 @@ def test_points_are_within_reach_at_home_however_the_robot_is_turned_about_the_v
 def test_jets_are_within_reach_at_home_however_the_robot_is_turned(tmp_path):
     robot = drone(tmp_path)
     away = np.linalg.norm(offsets(robot, [jet.frame for jet in robot.jets]), axis=1)
-    assert away.max() < robot.turned_reach.min()
-    np.testing.assert_allclose(robot.turned_reach, 0.2 + proportions.BEYOND_HOME * 0.4)
+    assert away.max() < robot.jet_reach.min()
+    np.testing.assert_allclose(robot.jet_reach, 0.2 + proportions.BEYOND_HOME * 0.4)
 
 
 def test_a_robot_twice_as_large_reaches_and_lifts_twice_as_far():
@@ -84,12 +84,12 @@ def test_a_table_that_states_one_number_leaves_the_other_as_it_follows(tmp_path)
     assert stated.contact_reach.tolist() == [0.5, 0.5, 0.4]
     assert stated.gait.swing == 0.3
     assert stated.gait.lift == pytest.approx(proportions.LIFT * stated.standing_height)
-    assert stated.turned_reach == pytest.approx(proportions.BEYOND_HOME * stated.standing_height)
+    assert stated.jet_reach == pytest.approx(proportions.BEYOND_HOME * stated.standing_height)
 
 
 def test_leaving_jets_off_changes_no_reach(tmp_path):
     robot = drone(tmp_path)
-    assert robot.with_jets(()).turned_reach is robot.turned_reach
+    assert robot.with_jets(()).jet_reach is robot.jet_reach
 
 
 def step_forward():

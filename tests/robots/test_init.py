@@ -26,6 +26,7 @@ WALKERS = {
     "a1": ("a1_description/urdf/a1.urdf", (1, 1, 1, 1), 12),
     "b1": ("b1_description/urdf/b1.urdf", (1, 1, 1, 1), 12),
     "romeo": ("romeo_description/urdf/romeo_small.urdf", (4, 4), 29),
+    "laikago": ("laikago_description/urdf/laikago.urdf", (1, 1, 1, 1), 12),
 }
 """Where the URDF is, how many contact points each foot has, and how many joints move."""
 ARMS = {"panda": "panda_description/urdf/panda.urdf", "ur5": "ur_description/urdf/ur5_robot.urdf"}
@@ -50,8 +51,8 @@ def test_a_robot_that_walks_stands_on_its_feet_without_a_change_to_what_was_made
     points, unit = contacts(robot), robot.standing_height
     assert np.abs(points[:, 2]).max() < 0.03 * unit  # on one level, on the ground
     com = robot.com_at(robot.home)
-    assert (points[:, :2].min(axis=0) - 0.1 * unit < com[:2]).all()  # Bolt's two points need a hand
-    assert (com[:2] < points[:, :2].max(axis=0) + 0.1 * unit).all()
+    assert (points[:, :2].min(axis=0) - 0.005 * unit < com[:2]).all()  # Bolt's two points are on a line
+    assert (com[:2] < points[:, :2].max(axis=0) + 0.005 * unit).all()
     limits, home = robot.joint_limits, robot.home.joint_positions
     assert (limits.lower <= home).all()
     assert (home <= limits.upper).all()
@@ -89,6 +90,13 @@ def test_an_unbent_leg_bends_ahead_with_a_level_sole(tmp_path):
             for link in ("hip_pitch", "knee", "ankle_roll")
         )
         assert knee[0] > max(hip[0], ankle[0]) + 0.02
+
+
+def test_folded_legs_stand_on_their_feet_and_not_on_their_knees(tmp_path):
+    robot = made("laikago_description/urdf/laikago.urdf", tmp_path)
+    pose = robot.home.base_transform, robot.home.joint_positions
+    knees = [np.array(robot.kindyn.forward_kinematics(f"{leg}_calf", *pose))[2, 3] for leg in ("FR", "FL", "RR", "RL")]
+    assert min(knees) > contacts(robot)[:, 2].max() + 0.2 * robot.standing_height
 
 
 def test_a_quadrotor_has_rotors_that_push_up_and_holds_its_propellers_still(tmp_path):

@@ -131,6 +131,7 @@ def change(scenario: Scenario, settings: Iterable[str]) -> Scenario:
     return from_dict(table, scenario)
 
 
+@checked
 def parted(setting: str) -> tuple[str, Any]:
     """Return key and value of a text such as `final_com_height=0.8`; the value is as TOML has it.
 

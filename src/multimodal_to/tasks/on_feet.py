@@ -10,10 +10,10 @@ from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.contacts import ContactState
 from multimodal_to.scenarios.gaits import GaitKind, GaitPlan, groups_of
-from multimodal_to.scenarios.keyframes import HOME, Keyframe
+from multimodal_to.scenarios.keyframes import END, HOME, Keyframe, Momentum
 from multimodal_to.scenarios.scenario import Margins, Scenario, Terminal
 from multimodal_to.tasks.costs import weights
-from multimodal_to.tasks.given import com_range, given, positive, refuse_footless, speed_max
+from multimodal_to.tasks.given import given, looks, positive, refuse_footless
 
 DEPTH, HEIGHT = 0.2, 0.15
 """How far a robot squats and jumps by default [L]."""
@@ -77,6 +77,7 @@ def jump(robot: Robot, *, height: float | None = None) -> Scenario:
         interval=flight / in_air,
         margins=Margins(touch_down_speed=math.sqrt(2.0 * height / length)),
         mid_height_min=robot.home_com[2] + height,
+        keyframes=(Keyframe(when=END, momentum=Momentum(linear=(0.0, 0.0, 0.0))),),
         contacts=(
             given(robot, ContactState.ON, 0.0, begin),
             given(robot, ContactState.OFF, begin, end, clearance=0.5 * height),
@@ -91,8 +92,8 @@ def step(robot: Robot, *, ahead: float | None = None, aside: float = 0.0) -> Sce
 
     Args:
         robot: that steps.
-        ahead: how far it gets along x of the world [m]; 0.3 L where neither is said.
-        aside: how far it gets along y of the world [m].
+        ahead: how far it gets where it looks, see `looks` [m]; 0.3 L where neither is said.
+        aside: how far it gets to its left [m].
 
     Raises:
         ScenarioError: the robot has no legs, or neither two feet nor four.
@@ -108,7 +109,7 @@ def walk(robot: Robot, *, distance: float | None = None, gait: GaitKind = GaitKi
 
     Args:
         robot: that walks.
-        distance: how far it gets along x of the world, backwards where it is negative [m]; where it is not said,
+        distance: how far it gets where it looks, backwards where it is negative [m]; where it is not said,
             `DISTANCE` of the gait.
         gait: which feet swing together.
 
@@ -128,7 +129,7 @@ def trot(robot: Robot, *, distance: float | None = None) -> Scenario:
 
     Args:
         robot: that trots.
-        distance: how far it gets along x of the world, backwards where it is negative [m]; 1.5 L where it is not said.
+        distance: how far it gets where it looks, backwards where it is negative [m]; 1.5 L where it is not said.
 
     Raises:
         ScenarioError: the robot has no legs, or not four feet.
@@ -159,7 +160,7 @@ def _gait(robot: Robot, name: str, title: str, kind: GaitKind, way: tuple[float,
         knots=knots,
         interval=interval,
         margins=Margins(touch_down_speed=0.15 if kind is GaitKind.WALK else 0.25),
-        final_com_shift=(*way, 0.0),
+        final_com_shift=(looks(robot) * way[0], looks(robot) * way[1], 0.0),
         gait=plan,
     )
 
@@ -167,7 +168,6 @@ def _gait(robot: Robot, name: str, title: str, kind: GaitKind, way: tuple[float,
 def _on_feet(robot: Robot, name: str, title: str, *, knots: int, interval: float, **more: Any) -> Scenario:
     refuse_footless(robot, name)
     time = robot.units.of("s")
-    way = more.get("final_com_shift", (0.0, 0.0, 0.0))
     return Scenario(
         name=name,
         title=title,
@@ -179,8 +179,6 @@ def _on_feet(robot: Robot, name: str, title: str, *, knots: int, interval: float
         interval_min=interval * time,
         interval_max=interval * time,
         weights=weights(robot, robot.units),
-        base_speed_max=speed_max(robot.units),
-        com_range=com_range(robot, way),
         **more,
     )
 
