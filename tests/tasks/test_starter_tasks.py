@@ -148,6 +148,9 @@ def test_a_name_of_both_is_the_bundled_scenario_for_the_iron_cub_and_the_starter
     assert mt.tasks.find("jump", solo) == mt.tasks.jump(solo)
     assert mt.tasks.find("squat", cub) == mt.tasks.squat(cub)
     assert mt.tasks.find("landing", solo) == mt.scenarios.landing()
+    assert mt.tasks.walk(cub, distance=0.4).final_com_shift == (-0.4, 0.0, 0.0)  # it looks towards −x
+    assert mt.tasks.step(cub, aside=0.1).final_com_shift == (0.0, -0.1, 0.0)
+    assert mt.tasks.walk(solo, distance=0.4).final_com_shift == (0.4, 0.0, 0.0)
 
 
 def test_numbers_of_a_task_and_of_its_scenario_are_set_alike(solo):

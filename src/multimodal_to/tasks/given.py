@@ -10,8 +10,26 @@ from multimodal_to.errors import ScenarioError
 from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.contacts import ContactState, ContactStretch
 
+_TOES = 0.02
+"""A sole points ahead or back from its ankle where its middle is farther from it along x than this [L]."""
 _LINE = 0.02
 """Contact points that are no farther from a line are on it [L]."""
+
+
+def looks(robot: Robot) -> float:
+    """Return 1 where a robot looks along x of the world at home, −1 where its soles point back from their ankles."""
+    bodies, home = robot.kindyn.tree.bodies, robot.home
+
+    def along(frame: str) -> float:
+        return float(robot.kindyn.forward_kinematics(frame, home.base_transform, home.joint_positions)[0, 3])
+
+    ways = [
+        along(robot.contact_names[point]) - along(bodies[robot.kindyn.tree.frame(robot.contact_names[point]).body].name)
+        for points in robot.feet.values()
+        if len(points) > 2 and robot.joint_names
+        for point in points
+    ]
+    return -1.0 if ways and float(np.mean(ways)) < -_TOES * robot.standing_height else 1.0
 
 
 def given(robot: Robot, state: ContactState, begin: float, end: float, clearance: float = 0.0) -> ContactStretch:

@@ -21,7 +21,7 @@ from multimodal_to.scenarios.contacts import ContactState
 from multimodal_to.scenarios.keyframes import HOME
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 from multimodal_to.tasks.costs import weights
-from multimodal_to.tasks.given import given, positive, refuse_footless
+from multimodal_to.tasks.given import given, looks, positive, refuse_footless
 
 HEIGHT = 0.5
 """How high a robot takes off, and from where it lands, by default [ℓ]."""
@@ -41,13 +41,13 @@ def hover(robot: Robot, *, by: Vector3 | None = None) -> Scenario:
 
     Args:
         robot: that flies; it starts ℓ above home, where it has feet.
-        by: how far it gets in the world [m]; ℓ along x where it is not said.
+        by: how far it gets in the world [m]; ℓ ahead where it is not said.
 
     Raises:
         ScenarioError: the robot has no jets, or jets that cannot carry it, or the way is no finite one.
     """
     length = _units(robot).length
-    by = (length, 0.0, 0.0) if by is None else by
+    by = (looks(robot) * length, 0.0, 0.0) if by is None else by
     if not all(map(math.isfinite, by)):
         raise ScenarioError(f"by is {by}; expected three finite numbers [m]")
     _spool_up_time(robot, "hover")

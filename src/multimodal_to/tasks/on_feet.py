@@ -13,7 +13,7 @@ from multimodal_to.scenarios.gaits import GaitKind, GaitPlan, groups_of
 from multimodal_to.scenarios.keyframes import HOME, Keyframe, Momentum
 from multimodal_to.scenarios.scenario import Margins, Scenario, Terminal
 from multimodal_to.tasks.costs import weights
-from multimodal_to.tasks.given import given, positive, refuse_footless
+from multimodal_to.tasks.given import given, looks, positive, refuse_footless
 from multimodal_to.trajectory.instants import END
 
 DEPTH, HEIGHT = 0.2, 0.15
@@ -93,8 +93,8 @@ def step(robot: Robot, *, ahead: float | None = None, aside: float = 0.0) -> Sce
 
     Args:
         robot: that steps.
-        ahead: how far it gets along x of the world [m]; 0.3 L where neither is said.
-        aside: how far it gets along y of the world [m].
+        ahead: how far it gets where it looks, see `looks` [m]; 0.3 L where neither is said.
+        aside: how far it gets to its left [m].
 
     Raises:
         ScenarioError: the robot has no legs, or neither two feet nor four.
@@ -110,7 +110,7 @@ def walk(robot: Robot, *, distance: float | None = None, gait: GaitKind = GaitKi
 
     Args:
         robot: that walks.
-        distance: how far it gets along x of the world, backwards where it is negative [m]; where it is not said,
+        distance: how far it gets where it looks, backwards where it is negative [m]; where it is not said,
             `DISTANCE` of the gait.
         gait: which feet swing together.
 
@@ -130,7 +130,7 @@ def trot(robot: Robot, *, distance: float | None = None) -> Scenario:
 
     Args:
         robot: that trots.
-        distance: how far it gets along x of the world, backwards where it is negative [m]; 1.5 L where it is not said.
+        distance: how far it gets where it looks, backwards where it is negative [m]; 1.5 L where it is not said.
 
     Raises:
         ScenarioError: the robot has no legs, or not four feet.
@@ -161,7 +161,7 @@ def _gait(robot: Robot, name: str, title: str, kind: GaitKind, way: tuple[float,
         knots=knots,
         interval=interval,
         margins=Margins(touch_down_speed=0.15 if kind is GaitKind.WALK else 0.25),
-        final_com_shift=(*way, 0.0),
+        final_com_shift=(looks(robot) * way[0], looks(robot) * way[1], 0.0),
         gait=plan,
     )
 
