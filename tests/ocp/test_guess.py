@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import multimodal_to as mt
+from hopper import hop, hopper
+from multimodal_to.ocp.gait import GROUNDED
 from multimodal_to.ocp.guess import LANDED
 from multimodal_to.trajectory.derived import surface_frames
 
@@ -52,3 +54,17 @@ def test_a_robot_that_stays_in_the_air_is_carried_by_its_jets_all_the_way(ironcu
     assert values["contact_forces"] == pytest.approx(0.0, abs=0.02)
     assert values["thrust"].sum(axis=0) == pytest.approx(np.full(21, ironcub.weight))
     assert (heights(aside, values) > 0.05).all()
+
+
+def test_a_robot_whose_feet_no_joint_moves_stands_until_its_thrusts_carry_it(tmp_path):
+    robot = hopper(tmp_path)
+    violations, values = guessed(robot, hop(robot))
+    leaves = round(GROUNDED * 20)
+    height, lifted = values["com_position"][2], values["contact_positions"][2::3]
+    assert (height[: leaves + 1] == height[0]).all()
+    assert height[-1] == pytest.approx(0.6)
+    assert lifted == pytest.approx(np.tile(height - height[0], (4, 1)), abs=1e-5)
+    carried = values["thrust"].sum(axis=0) + values["contact_forces"][2::3].sum(axis=0)
+    assert carried == pytest.approx(robot.weight, rel=1e-6)
+    assert violations["contact_kinematics"] < 1e-5
+    assert violations["contact_reach"] == 0.0

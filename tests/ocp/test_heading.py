@@ -135,3 +135,25 @@ def test_a_start_near_half_a_turn_gets_the_sign_of_the_problem(tmp_path, straigh
         x = problem.start_from(replace(plan, base_quaternion_xyzw=quaternions)) * problem.scale
         rho = layout.read_horizon(x)["base_quaternion_xyzw"]
         assert (problem.robot.upright.base_quaternion_xyzw @ rho > 0.99).all()
+
+
+def test_the_other_sign_of_a_quaternion_that_is_given_leaves_the_problem_as_it_is(tmp_path, straight):
+    """Of home, of the state that a motion starts in, and of a keyframe: no bit of the problem changes."""
+    _, solution = straight
+    first = hopper(tmp_path / "first", turn=heading(1.0))
+    other = hopper(tmp_path / "other", turn=-heading(1.0))
+    asked = mt.Keyframe(when="end", base_orientation=tuple(heading(1.2)), orientation_tolerance=0.3)
+    counter = replace(asked, base_orientation=tuple(-heading(1.2)))
+    task = {"knots": 4, "start": mt.Start.GIVEN, "initial_com": None, "terminal": mt.Terminal.FREE}
+    state = mt.state_at(solution.trajectory, 0.5)
+    turned = replace(state, base_quaternion_xyzw=-np.asarray(state.base_quaternion_xyzw))
+    problems = [
+        mt.build(robot, hop(robot, **task, keyframes=(keyframe,)), initial=start)
+        for robot, keyframe, start in ((first, asked, state), (other, counter, turned))
+    ]
+    for name in ("guess", "lower", "upper", "row_lower", "row_upper"):
+        assert np.array_equal(*(getattr(problem, name) for problem in problems)), name
+    x = problems[0].guess + 0.01 * np.random.default_rng(0).normal(size=problems[0].guess.size)
+    assert problems[1].rows_at(x) == pytest.approx(problems[0].rows_at(x), rel=1e-12, abs=1e-12)
+    costs = [problem.costs(x) for problem in problems]
+    assert costs[1] == pytest.approx(costs[0], rel=1e-12)

@@ -14,6 +14,7 @@ from hopper import heading, hop
 from hopper import hopper as make_hopper
 from multimodal_to.adam import quaternion
 from multimodal_to.errors import FormulationError, ScenarioError
+from multimodal_to.models.units import REFERENCE
 from multimodal_to.ocp import keyframes
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.outline import formulate, prepared
@@ -72,8 +73,9 @@ def test_a_term_at_chosen_knots_and_intervals_has_rows_there_and_nowhere_else(ho
     x = np.random.default_rng(0).normal(size=problem.guess.size)
     z = problem.layout.read_horizon(x * problem.scale)["com_position"][2]
     values = problem.rows_at(x)
-    assert values[problem.rows["squared"].index] == pytest.approx(z[[2, 5]] ** 2)
-    assert values[problem.rows["climb"].index] == pytest.approx([z[2] * z[3]])
+    squares, products = problem.rows["squared"], problem.rows["climb"]
+    assert values[squares.index] * squares.scale == pytest.approx(z[[2, 5]] ** 2)
+    assert values[products.index] * products.scale == pytest.approx([z[2] * z[3]])
     assert problem.costs(x)["height"] == pytest.approx(3.0 * z[4] ** 2)
 
 
@@ -156,7 +158,7 @@ def test_the_slopes_of_orientations_are_finite_where_nothing_is_off(hopper):
 
 ASKED = {
     "com": (mt.Keyframe(knot=3, com={"z": 0.5}), "com_position", 2, 0.5, 0.5),
-    "com_min": (mt.Keyframe(knot=3, com_min={"z": 0.5}), "com_position", 2, 0.5, 1.5),
+    "com_min": (mt.Keyframe(knot=3, com_min={"z": 0.5}), "com_position", 2, 0.5, 1.5 * 0.4 / REFERENCE.length),
     "base_position": (mt.Keyframe(when=0.5, base_position={"x": 0.1}), "base_position", 0, 0.1, 0.1),
     "joints": (
         mt.Keyframe(knot=3, joints={"left_pitch": 0.2}, joint_tolerance=0.05),
@@ -282,7 +284,8 @@ def test_a_planner_keeps_the_keyframes_on_the_way_to_another_end(hopper):
     assert solution.status.solved
     assert solution.trajectory.com_position[:, -1] == pytest.approx([0.0, 0.0, 0.62], abs=1e-8)
     assert solution.trajectory.com_position[2, 24] >= 0.55 - 1e-8
-    assert planner.problem.bound_rows["end: CoM"].lower == pytest.approx([0.0, 0.0, 0.62])
+    held = planner.problem.bound_rows["end: CoM"]
+    assert held.lower * held.scale == pytest.approx([0.0, 0.0, 0.62])
 
 
 def test_a_turn_of_a_hover_is_guessed_and_made(hopper):

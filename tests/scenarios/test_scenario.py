@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from drones import drone
+from hopper import hopper
 from multimodal_to import scenario_files, scenarios
 from multimodal_to.errors import ModelError, ScenarioError
 from multimodal_to.models.terrain import FlatGround, Plane, Stairs, heights_below
+from multimodal_to.models.units import REFERENCE
 from multimodal_to.ocp import build
 from multimodal_to.ocp.guess import contact_positions, standing_posture
 from multimodal_to.ocp.variables import Layout, ranges
@@ -209,3 +211,23 @@ def test_a_scenario_as_in_the_paper_has_no_margins_and_no_cost_of_later(name):
     weights = scenario.weights
     added = (weights.throttle_rate, weights.joint_accelerations, weights.foot_tilt, weights.skimming)
     assert added == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_ranges_that_a_scenario_leaves_open_follow_from_the_robot_and_what_is_asked(ironcub, scenario, tmp_path):
+    small = hopper(tmp_path)
+    length = small.units.length / REFERENCE.length
+    assert scenario.base_speeds(ironcub) == (2.0, 2.0)
+    assert scenario.com_box(ironcub) == (1.5, 1.5, 1.5)
+    assert scenario.base_speeds(small) == pytest.approx((2.0 * length**0.5, 2.0 * length**-0.5), rel=1e-3)
+    assert scenario.com_box(small) == pytest.approx((1.5 * length,) * 3, rel=1e-3)
+    leap = replace(scenario, final_com=(2.0, 0.0, 0.57), mid_height_min=1.0)
+    assert leap.com_box(ironcub)[0] == pytest.approx(2.0 + 0.5 * ironcub.standing_height)
+    assert leap.base_speeds(ironcub.with_jets(()))[0] == pytest.approx((2.0 * 9.80665 * 0.43) ** 0.5)
+    stated = replace(scenario, base_speed_max=3.0, com_range=(1.0, 1.0, 0.9))
+    assert (stated.base_speeds(small), stated.com_box(small)) == ((3.0, 3.0), (1.0, 1.0, 0.9))
+
+
+def test_a_point_that_bears_its_share_is_let_as_near_to_the_ground_by_every_robot(ironcub, scenario, tmp_path):
+    for robot in (ironcub, hopper(tmp_path)):
+        bounds = np.array(replace(scenario, complementarity_max=None, sliding_max=None).contact_bounds(robot))
+        assert bounds * len(robot.contacts) / robot.weight / robot.standing_height == pytest.approx([1.6e-4, 6.4e-5])

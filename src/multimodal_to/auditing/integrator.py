@@ -16,7 +16,6 @@ No motion like this is stable without a controller. So the state starts again fr
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,12 +28,13 @@ from multimodal_to.auditing.findings import Motion, Worst, worst_of
 from multimodal_to.models.attitude import continuous
 from multimodal_to.models.jet import FirstOrder, StaticMap
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.units import Sized
 from multimodal_to.trajectory import Trajectory, rules
 
 Indices = NDArray[np.intp]
 STRETCH = 2.0
 """For how long the integrator runs from a knot, in √(L/g): 0.48 s for the iRonCub."""
-_LARGEST_STEP = 0.05  # of the integrator [s]; its own error is then below 1e-5 m and 1e-4 rad
+_LARGEST_STEP = Sized(0.05, "s")  # of the integrator; its own error is then below 1e-5 m and 1e-4 rad
 _X, _V, _H, _RHO, _THRUSTS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13), 13
 """Where the parts of a state are; T and Ṫ of all jets follow from `_THRUSTS` on."""
 
@@ -70,9 +70,9 @@ def integrator_findings(motion: Motion) -> list[Worst]:
 def natural_time(robot: Robot) -> float:
     """Return √(L/g) [s], the time in which an inverted pendulum of the robot's standing height falls by a factor of e.
 
-    Without gravity it is that under 9.81 m/s².
+    Without gravity it is that under the Earth's.
     """
-    return 1.0 / (robot.rate_unit or math.sqrt(9.81 / robot.standing_height))
+    return robot.units.of("s")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,7 +104,7 @@ class Controls:
         """
         robot, trajectory, kindyn = motion.robot, motion.trajectory, motion.robot.kindyn
         lags = [jet.model.time_constant for jet in robot.jets if isinstance(jet.model, FirstOrder)]
-        longest = min([_LARGEST_STEP, *lags])
+        longest = min([_LARGEST_STEP.of(robot.units), *lags])
         steps = steps or max(1, int(np.ceil(np.diff(trajectory.time).max() / longest - 1e-9)))
         steps += steps % 2 if rules.acts_after(trajectory.rule) else 0
         instants = _instants(trajectory.time, 2 * steps)

@@ -18,13 +18,14 @@ from multimodal_to.errors import ScenarioError, apart
 from multimodal_to.models.joint_units import joint_units
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
+from multimodal_to.models.units import Sized
 from multimodal_to.ocp import paper
 from multimodal_to.ocp.guess import standing_posture
 from multimodal_to.ocp.waypoints import com as com_path
 from multimodal_to.scenarios.keyframes import AXES, Placed, attitude_at, by_axis
 
-_MISSED = 1e-3
-"""A frame that a search brings no nearer than this to where it is asked to be counts as out of reach [m]."""
+_MISSED = Sized(1e-3, "m")
+"""A frame that a search brings no nearer than this to where it is asked to be counts as out of reach."""
 _OFF = 1e-9
 
 
@@ -158,7 +159,7 @@ def frames(task: Task) -> Iterator[Symptom]:
                     return
         missed = _nearest(task, one, targets)
         for name, distance in missed.items():
-            if distance > _MISSED + one.keyframe.frames[name].position_tolerance:
+            if distance > _MISSED.of(task.robot.units) + one.keyframe.frames[name].position_tolerance:
                 where = "with the CoM where it is asked to be, " if com else ""
                 yield warning(
                     one.label,

@@ -9,10 +9,11 @@ from multimodal_to.doctor.diagnosis import Symptom, error
 from multimodal_to.doctor.task import Task
 from multimodal_to.errors import ModelError
 from multimodal_to.models.bodies import bodies_of
+from multimodal_to.models.units import Sized
 from multimodal_to.ocp.regions import regions_of
 
-_NEAR = 1e-5
-"""By how much a start may be nearer than the distance that is asked for [m]."""
+_NEAR = Sized(1e-5, "m")
+"""By how much a start may be nearer than the distance that is asked for."""
 
 
 def regions(task: Task) -> Iterator[Symptom]:
@@ -29,7 +30,7 @@ def regions(task: Task) -> Iterator[Symptom]:
         base, joints = posture.base_transform[None], posture.joint_positions[:, None]
         free = {body.name: float(room(robot, region, body, base, joints)[0]) - region.distance for body in bodies}
         name = min(free, key=lambda body: free[body])
-        if free[name] < -_NEAR:
+        if free[name] < -_NEAR.of(task.robot.units):
             yield error(
                 "walls and boxes",
                 f"in the posture in which the motion starts, '{name}' is {-free[name]:.3g} m beyond where "

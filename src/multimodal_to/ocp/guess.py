@@ -223,7 +223,9 @@ def _progress(robot: Robot, scenario: Scenario, schedule: Schedule) -> Array:
 
 def _lifts_off_whole(robot: Robot, scenario: Scenario) -> bool:
     """Return whether a motion leaves the ground for the air with feet that no joint moves, so that they go along."""
-    if not robot.contacts or scenario.start is not Start.STANDING or scenario.terminal is not Terminal.HOVER:
+    if scenario.start is not Start.STANDING or scenario.terminal is not Terminal.HOVER:
+        return False
+    if not robot.contacts or scenario.keyframes_between():
         return False
     return all(robot.kindyn.tree.frame(name).body == 0 for name in robot.contact_names)
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.arguments import check_fields
+from multimodal_to.arguments import check_fields, checked
 from multimodal_to.errors import FormulationError, ScenarioError, unknown
 from multimodal_to.models.joint_units import either
 from multimodal_to.models.robot import Robot
@@ -41,6 +41,7 @@ class Variable:
         if not 0 < scale < math.inf:
             raise FormulationError(f"the scale of '{self.name}' is {scale}; expected a positive number")
 
+    @checked
     def scales(self, robot: Robot) -> list[float]:
         """Return the scale of each row of the variable, for a robot [own unit]."""
         return [size_of(self.scale, unit, robot.units) for unit in row_units(QUANTITIES[self.name], robot)]

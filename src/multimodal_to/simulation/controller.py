@@ -184,6 +184,7 @@ def row_of(time: float, period: float, plan: Reference) -> int:
     return min(max(round(time / period), 0), len(plan.com) - 1)
 
 
+@checked
 def servo(units: Units, count: int, stiffness: float, damping: float) -> tuple[Array, Array]:
     """Return K [N m/rad] and D [N m s/rad] of joints' servos, (count,) each.
 
