@@ -45,9 +45,9 @@ def regions(task: Task) -> Iterator[Symptom]:
 
 
 def targets(task: Task) -> Iterator[Symptom]:
-    """Look for frames that a keyframe asks to be beyond a wall or a box that they, or their link's capsules, keep to.
+    """Look for frames that a keyframe asks to be where a wall or a box that names them in `of` does not let them be.
 
-    A frame with a tolerance of its own may be anywhere within that.
+    A frame with a tolerance may be anywhere within that.
     """
     knots = task.scenario.knots
     for one in task.scenario.own_keyframes():

@@ -389,6 +389,7 @@ class Scenario:
         """Return every keyframe at its knot: those with a short name, then those of `keyframes`."""
         return (*self.short_keyframes(), *self.own_keyframes())
 
+    @checked
     def held_at(self, knot: int) -> list[Keyframe]:
         """Return those of `keyframes` that hold at a knot, and are no costs."""
         return [one for one in self.keyframes if one.weight is None and one.at(self.knots) == knot]
