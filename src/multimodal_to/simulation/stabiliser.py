@@ -186,7 +186,9 @@ def rotation_vector(rotation: Array) -> Array:
     return vector
 
 
-def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, balance: Balance, shift: Array) -> Array:
+def _wanted(
+    simulation: SimulationModel, data: Any, plan: Reference, step: int, balance: Balance, shift: Array
+) -> Array:
     """Return Δl̇ [N] and Δḣω [N m] about the CoM, (6,).
 
     Args:
