@@ -24,7 +24,7 @@ from multimodal_to.simulation.controller import Belief
 from multimodal_to.simulation.feet import PlannedFeet
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference
-from multimodal_to.simulation.stabiliser import rotation_vector
+from multimodal_to.simulation.stabiliser import rotation_vector, touching
 from multimodal_to.simulation.units import Units
 
 SOON = 0.3  # how long before it is loaded a foot is led to its place [s]
@@ -72,15 +72,15 @@ class Footing:
     def step(self, step: int) -> Step:
         """Return what the feet change of a row of the plan, in the state that `belief` has taken over."""
         feet, data, period = self._feet, self._belief.data, self._period
-        touching = self._belief.simulation.touching(data)
+        touches = touching(self._belief.simulation, data)
         positions = data.geom_xpos[self._belief.simulation.points]
         places = [positions[own].mean(axis=0) for own in feet.members]
         until = self._until[:, step]
         for foot, own in enumerate(feet.members):
-            touches = bool(touching[own].any())
-            if until[foot] > 0.0 and not touches:
+            touched = bool(touches[own].any())
+            if until[foot] > 0.0 and not touched:
                 self._down[foot] = np.inf
-            elif touches and until[foot] < SOON:
+            elif touched and until[foot] < SOON:
                 self._down[foot] = min(self._down[foot], step)
             if step - self._down[foot] < SETTLING / period:
                 self._offset[foot, :2] = (places[foot] - feet.middle[foot, step])[:2]

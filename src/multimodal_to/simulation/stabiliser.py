@@ -93,7 +93,7 @@ def correct(
     joints = np.zeros(len(robot.joint_names))
     com, points = data.subtree_com[1], data.geom_xpos[simulation.points]
     loads = np.maximum(plan.contact_forces[step][:, 2], 0.0)
-    touches = balance.same_foot @ simulation.touching(data)
+    touches = balance.same_foot @ touching(simulation, data)
     standing = np.flatnonzero((balance.same_foot @ loads > flight_force(robot)) & touches)  # loaded by the plan
     if not standing.size:
         return Correction(contact_forces=forces, torques=joints, joints=joints)
@@ -175,6 +175,13 @@ def _unborne(arms: Array, shares: Array, radius: float) -> Array:
     """
     spread = sum(share * skew(arm).T @ skew(arm) for arm, share in zip(arms * [1.0, 1.0, 0.0], shares, strict=True))
     return np.asarray(radius**2 * np.linalg.inv(spread + radius**2 * np.eye(3)))
+
+
+def touching(simulation: SimulationModel, data: Any) -> NDArray[np.bool_]:
+    """Return which contact points touch the ground in the state of MuJoCo's `MjData` of a model, (contacts,)."""
+    touches = np.zeros(simulation.model.ngeom, dtype=bool)
+    touches[data.contact.geom] = True
+    return np.asarray(touches[simulation.points])
 
 
 def rotation_vector(rotation: Array) -> Array:
