@@ -188,8 +188,9 @@ def test_thrusts_stay_with_the_plan_while_the_feet_carry_the_robot(at_the_end):
 class Feet:
     """The step up with a robot that is where a test puts it, and what is done about its feet."""
 
-    def __init__(self, robot, plan):
-        self.belief, self.plan = Belief(robot, plan), reference(robot, plan, np.arange(0.0, plan.duration, 2e-3))
+    def __init__(self, robot, plan, thrusts):
+        rows = reference(robot, plan, np.arange(0.0, plan.duration, 2e-3))
+        self.belief, self.plan = Belief(robot, plan), replace(rows, thrust=thrusts * rows.thrust)
         self.footing = Footing(self.belief, self.plan, 2e-3, 1.0)
         loaded = self.plan.contact_forces[:, :, 2].sum(axis=1) > 0.1 * robot.weight
         self.touch_down = int(loaded.argmax())
@@ -228,7 +229,7 @@ class Feet:
 
 @pytest.fixture(scope="module")
 def feet(ironcub, step_up):
-    return lambda: Feet(ironcub, step_up)
+    return lambda thrusts=1.0: Feet(ironcub, step_up, thrusts)
 
 
 def test_feet_of_a_robot_that_tilts_in_the_air_come_down_level(feet):
@@ -243,25 +244,26 @@ def test_feet_of_a_robot_that_tilts_in_the_air_come_down_level(feet):
     assert some.slant() == pytest.approx(slant, abs=2e-3)
 
 
-def test_feet_come_down_where_the_robot_falls(feet):
-    """A robot that is 2 cm too far puts its feet 2 cm farther in the world, which is where its plan has them of it."""
-    some = feet()
+@pytest.mark.parametrize(("thrusts", "follow"), [(0.0, 1.0), (1.0, 0.0)])
+def test_feet_come_down_where_the_robot_falls_and_where_the_plan_has_them_if_thrusts_carry_it(feet, thrusts, follow):
+    """A robot that falls 2 cm too far puts its feet 2 cm farther in the world; jets bring it back by themselves."""
+    some = feet(thrusts)
     before = some.touch_down - 20
     some.put(before)
     planned = some.middles()
     for off in ([0.02, 0.0, 0.0], [0.0, -0.02, 0.0]):
         joints = some.settled(before, off=off).joints
         some.put(before, off=off, joints=joints)
-        np.testing.assert_allclose(some.middles() - planned, [off, off], atol=5e-3)
+        np.testing.assert_allclose(some.middles() - planned, follow * np.array([off, off]), atol=5e-3)
 
 
 def test_the_plan_goes_with_the_feet_that_stand(feet):
+    """Of two feet that stand beside their places by the same, the legs stay as planned."""
     some = feet()
-    end = len(some.plan.com) - 10
-    assert np.linalg.norm(some.settled(end).place) < 2e-3
-    beside = some.settled(end, off=[0.02, 0.01, 0.0])
+    end, off = len(some.plan.com) - 10, [0.02, 0.01, -1e-3]
+    beside = some.settled(end, off=off)
     np.testing.assert_allclose(beside.place, [0.02, 0.01, 0.0], atol=2e-3)
-    assert np.abs(beside.joints).max() < 0.01  # both feet are beside their places by the same
+    assert np.abs(beside.joints).max() < 0.01
 
 
 @pytest.mark.parametrize("scenario", ["take-off", "step-up"])

@@ -1,12 +1,13 @@
-"""Legs put the feet where the robot needs them, and the plan goes with the feet that stand.
+"""Legs put the feet where the robot comes down, and the plan goes with the feet that stand.
 
-A robot that was pushed comes down somewhere else, and turned. A foot that is in the air and will soon be loaded goes to
+A robot that was pushed comes down somewhere else, and turned. Out of a flight, a foot that will soon be loaded goes to
 
-    c = c* + r a + k d,   d = x − x* − a + (ẋ − ẋ*) (t + √(L/g)),
+    c = c* + k (1 − F / m g) d,   d = x − x* + (ẋ − ẋ*) (t + √(L/g)),
 
-level as the plan has it, although the base is not: d is how far the capture point will be off when the foot comes down,
-t the time until then if no foot stands and zero if one does, and a how far the feet that stand are off. Leg joints turn by J⁺ of what that changes of
-the foot in the base's frame.
+level as the plan has it, although the base is not. d is how far the capture point will be off when the foot comes down,
+t the time until then, and F what the planned thrusts carry: they bring the robot back by themselves. Leg joints turn by
+J⁺ of what that changes of the foot in the axes of the base. While a foot stands the others are not led: the robot takes
+no step that is not planned.
 
 Where feet stand beside their planned places, by o each, the plan for the CoM moves with them: by a, the mean of o under
 the planned loads. The legs keep the feet o − a apart from the plan, so that they do not pull at each other.
@@ -19,21 +20,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.models.state import State
 from multimodal_to.simulation.controller import Belief
 from multimodal_to.simulation.feet import PlannedFeet
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference
-from multimodal_to.simulation.stabiliser import rotation_vector
+from multimodal_to.simulation.stabiliser import rotation_vector, touching
 
 SOON = 0.3  # how long before it is loaded a foot is led to its place [s]
 LOADED = 0.01  # a foot with more planned load than this is to stand [m g]
 FURTHEST = 0.25  # that a foot comes down off the plan [L]
-RETURN = 0.8  # share of a that a foot that comes down keeps [1]
 SETTLING = 0.1  # after it has come down a foot is where it stands [s]
 TURN_MAX = 0.5  # how far a leg's joint leaves the plan [rad or m]
 SOFT = 0.03  # of the legs' pseudo-inverse, against straight knees [1]
-SWING_LAG, STANCE_LAG = 0.03, 0.1  # with which the legs take over what is wanted of a foot in the air, on the ground [s]
+SWING_LAG = 0.03  # with which the legs take over what is wanted of a foot in the air [s]
+STANCE_LAG = 0.1  # and of a foot on the ground [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,16 +70,16 @@ class Footing:
 
     def step(self, step: int) -> Step:
         """Return what the feet change of a row of the plan, in the state that `belief` has taken over."""
-        plan, feet, data, period = self._plan, self._feet, self._belief.data, self._period
-        touching = self._belief.simulation.touching(data)
+        feet, data, period = self._feet, self._belief.data, self._period
+        touches = touching(self._belief.simulation, data)
         positions = data.geom_xpos[self._belief.simulation.points]
         places = [positions[own].mean(axis=0) for own in feet.members]
         until = self._until[:, step]
         for foot, own in enumerate(feet.members):
-            touches = bool(touching[own].any())
-            if until[foot] > 0.0 and not touches:
+            touched = bool(touches[own].any())
+            if until[foot] > 0.0 and not touched:
                 self._down[foot] = np.inf
-            elif touches and until[foot] < SOON:
+            elif touched and until[foot] < SOON:
                 self._down[foot] = min(self._down[foot], step)
             if step - self._down[foot] < SETTLING / period:
                 self._offset[foot, :2] = (places[foot] - feet.middle[foot, step])[:2]
@@ -93,7 +93,7 @@ class Footing:
                 lag, change[:3] = STANCE_LAG, self._offset[foot] - self._anchor
             elif until[foot] < SOON:
                 if down.any():
-                    continue
+                    continue  # it stays where the flight has led it
                 change = self._coming_down(foot, step, float(until[foot]))
             joints = self._of_joints(foot, place, change) if change.any() else 0.0
             self._wanted[foot] += (joints - self._wanted[foot]) * period / lag
@@ -108,14 +108,21 @@ class Footing:
             until: how long the robot flies until it comes down [s].
         """
         plan, data = self._plan, self._belief.data
-        away = data.subtree_com[1] - plan.com[step] - self._anchor
+        away = data.subtree_com[1] - plan.com[step]
         away = away + (data.subtree_linvel[1] - plan.com_velocity[step]) * (until + 1.0 / self._units.frequency)
-        away = RETURN * self._anchor + self._placement * away * [1.0, 1.0, 0.0]
+        free = max(0.0, 1.0 - self._lift(step) / self._units.force)
+        away = self._placement * free * away * [1.0, 1.0, 0.0]
         far, size = FURTHEST * self._units.length, float(np.linalg.norm(away))
         target = self._feet.middle[foot, step] + away * min(1.0, far / max(size, 1e-9))
         turn = self._belief.rotation @ plan.rotation[step].T
         as_planned = data.xpos[1] + turn @ (self._feet.middle[foot, step] - plan.base_position[step])
         return np.concatenate([target - as_planned, rotation_vector(turn.T)])
+
+    def _lift(self, step: int) -> float:
+        """Return how much the planned thrusts carry in a row of the plan [N]."""
+        data, simulation = self._belief.data, self._belief.simulation
+        axes = -data.site_xmat[simulation.jets].reshape(-1, 3, 3)[:, :, 2]
+        return float(self._plan.thrust[step] @ axes @ simulation.robot.up)
 
     def _of_joints(self, foot: int, place: Array, change: Array) -> Array:
         """Return J⁺ of a change of a foot, (n,).

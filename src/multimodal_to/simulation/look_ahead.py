@@ -104,6 +104,7 @@ class Feedback:
         Args:
             state: as it was measured, which `belief` has taken over.
             step: row of the plan.
+            shift: by which the plan for the CoM moves, world axes [m], (3,); by default it does not.
         """
         data, plan = self._belief.data, self._plan
         stands = bool(data.ncon)

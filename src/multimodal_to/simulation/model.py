@@ -112,13 +112,6 @@ class SimulationModel:
         count = len(self.robot.joint_names)
         self.model.actuator_biasprm[:count, 1], self.model.actuator_biasprm[:count, 2] = -stiffness, -damping
 
-    @checked
-    def touching(self, data: Any) -> NDArray[np.bool_]:
-        """Return which contact points touch the ground in the state of MuJoCo's `MjData` of this model, (contacts,)."""
-        touches = np.zeros(self.model.ngeom, dtype=bool)
-        touches[data.contact.geom] = True
-        return np.asarray(touches[self.points])
-
 
 @checked
 def build_model(

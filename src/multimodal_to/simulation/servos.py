@@ -29,7 +29,7 @@ class ServoGains(BalanceGains):
 
     stiffness: float = 1.2  # K of each joint's servo [m g L/rad]
     damping: float = 0.16  # D of each joint's servo [m g L √(L/g)/rad]
-    placement: float = 1.5  # k: how far a foot follows the capture point [1]
+    placement: float = 1.5  # k: share of the capture point's error that a foot follows out of a flight [1]
     look_ahead: LookAhead = field(default_factory=LookAhead)
 
 

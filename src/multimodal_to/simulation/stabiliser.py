@@ -93,7 +93,7 @@ def correct(
     joints = np.zeros(len(robot.joint_names))
     com, points = data.subtree_com[1], data.geom_xpos[simulation.points]
     loads = np.maximum(plan.contact_forces[step][:, 2], 0.0)
-    touches = balance.same_foot @ simulation.touching(data)
+    touches = balance.same_foot @ touching(simulation, data)
     standing = np.flatnonzero((balance.same_foot @ loads > flight_force(robot)) & touches)  # loaded by the plan
     if not standing.size:
         return Correction(contact_forces=forces, torques=joints, joints=joints)
@@ -177,6 +177,13 @@ def _unborne(arms: Array, shares: Array, radius: float) -> Array:
     return np.asarray(radius**2 * np.linalg.inv(spread + radius**2 * np.eye(3)))
 
 
+def touching(simulation: SimulationModel, data: Any) -> NDArray[np.bool_]:
+    """Return which contact points touch the ground in the state of MuJoCo's `MjData` of a model, (contacts,)."""
+    touches = np.zeros(simulation.model.ngeom, dtype=bool)
+    touches[data.contact.geom] = True
+    return np.asarray(touches[simulation.points])
+
+
 def rotation_vector(rotation: Array) -> Array:
     """Return Log R [rad], (3,)."""
     mujoco = mujoco_module()
@@ -186,7 +193,9 @@ def rotation_vector(rotation: Array) -> Array:
     return vector
 
 
-def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, balance: Balance, shift: Array) -> Array:
+def _wanted(
+    simulation: SimulationModel, data: Any, plan: Reference, step: int, balance: Balance, shift: Array
+) -> Array:
     """Return Δl̇ [N] and Δḣω [N m] about the CoM, (6,).
 
     Args:
