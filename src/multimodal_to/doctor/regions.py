@@ -59,7 +59,7 @@ def targets(task: Task) -> Iterator[Symptom]:
                 if not within or name not in region.of:
                     continue
                 slack = target.position_tolerance * math.sqrt(3.0)
-                if (lacks := region.distance - _free(region, target.position) - slack) > _NEAR:
+                if (lacks := region.distance - _free(region, target.position) - slack) > _NEAR.of(task.robot.units):
                     yield error(
                         one.label,
                         f"{name} has to be at {target.position} m, {lacks:.3g} m beyond where {region} lets it be",
