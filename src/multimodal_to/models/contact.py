@@ -52,7 +52,7 @@ def normal_force(surface: Surface, point: SX, force: SX) -> SX:
     return cs.dot(surface.normal(point), force)
 
 
-def friction_pyramid(surface: Surface, point: SX, force: SX, friction: float, force_size: float) -> SX:
+def friction_pyramid(surface: Surface, point: SX, force: SX, friction: float, force_size: float = 1.0) -> SX:
     """Return the four distances to the faces of the pyramid [N], (4, 1), none negative inside: μ n·f ∓ t·f (eq. 12).
 
     All of them together also make the normal force non-negative.
@@ -69,7 +69,7 @@ def friction_pyramid(surface: Surface, point: SX, force: SX, friction: float, fo
     return cs.vertcat(reach - along, reach + along)
 
 
-def friction_cone(surface: Surface, point: SX, force: SX, friction: float, force_size: float) -> SX:
+def friction_cone(surface: Surface, point: SX, force: SX, friction: float, force_size: float = 1.0) -> SX:
     """Return n·f and ((μ n·f)² − ‖t·f‖²) / F [N], (2, 1), none negative inside the second-order cone.
 
     Polynomial in the force, so smooth at f = 0 as well, where the norm itself is not; the first row chooses between the
