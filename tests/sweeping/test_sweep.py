@@ -15,7 +15,7 @@ import pytest
 
 import multimodal_to as mt
 from multimodal_to.errors import InputError, ModelError, OutputError, ScenarioError
-from multimodal_to.sweeping import Design, engines, read_design
+from multimodal_to.sweeping import Design, engines, plan, read_design
 from multimodal_to.sweeping import sweep as sweeping
 from multimodal_to.sweeping.engines import Ended, Processes
 from multimodal_to.sweeping.folder import Folder
@@ -26,6 +26,7 @@ from multimodal_to.sweeping.sweep import ATTEMPTS, Counts, counted
 from multimodal_to.sweeping.variants import variant
 from multimodal_to.trajectory import Trajectory
 from places import EXAMPLES
+from synthetic import take_off
 
 SWEEP = """
 scenario = "take-off"
@@ -193,20 +194,39 @@ def test_a_plan_that_takes_too_long_is_killed_and_says_so(tmp_path, monkeypatch)
     assert counts.failed == 1
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
-def test_a_killed_process_is_replaced(tmp_path):
-    engine = Processes(1)
-    (row,) = small().rows()
-    order = Order(
+def order_of(row, folder, *, simulate=False):
+    return Order(
         row=row,
-        folder=str(tmp_path),
+        folder=str(folder),
         started_from=None,
         base=row.scenario,
         time_limit=60.0,
-        simulate=False,
+        simulate=simulate,
         attempts=0,
         facts=facts(),
     )
+
+
+@pytest.mark.parametrize("what", ["robots", "plans", "rows"])
+def test_what_cannot_be_written_ends_the_sweep_and_is_no_row_so_that_the_plan_is_made_later(
+    ironcub, tmp_path, monkeypatch, what
+):
+    (row,) = small(grid={"robot.mass": (1.02,)}).rows()
+    if what != "robots":
+        made = take_off(ironcub), {"status": "optimal", "solved": True, "audit_holds": True}
+        monkeypatch.setattr(plan, "_made", lambda order, folder: made)
+    (tmp_path / what).write_text("as a full disk, this file is in the way of the folder", encoding="utf-8")
+    with pytest.raises(OutputError, match="cannot"):
+        plan.perform(order_of(row, tmp_path))
+    (tmp_path / what).unlink()
+    assert Folder(path=tmp_path).read_row(0) is None
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
+def test_a_killed_process_is_replaced_and_a_plan_is_played_back_where_that_is_asked(tmp_path):
+    engine = Processes(1)
+    (row,) = small().rows()
+    order = order_of(row, tmp_path, simulate=True)
     try:
         engine.submit(order)
         (worker,) = engine._workers.values()
@@ -216,6 +236,7 @@ def test_a_killed_process_is_replaced(tmp_path):
         engine.submit(order)
         (ended,) = engine.wait()
         assert ended.row["status"] == "optimal"
+        assert (ended.row["survived"], ended.row["simulated_end"]) == (True, "stands")
     finally:
         engine.close()
 

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from multimodal_to import ending
 from multimodal_to.cli.common import app, number_option, out, whole_number_option
 from multimodal_to.errors import InputError
 from multimodal_to.sweeping.design import Design, read_design
@@ -59,22 +60,26 @@ def sweep_file(
         return
     if output is None:
         raise InputError("expected the folder of the sweep: --output DIR")
-    with out.status("") as line:
 
-        def tell(counts: Counts) -> None:
-            line.update(_said(counts))
+    def tell(counts: Counts) -> None:
+        line.update(_said(counts))
 
-        counts = sweep(
-            design,
-            output,
-            workers=workers,
-            engine=engine,
-            address=address,
-            time_limit=time_limit,
-            simulate=simulate,
-            warm=not cold,
-            progress=None if quiet else tell,
-        )
+    try:
+        with ending.raised(), out.status("") as line:
+            counts = sweep(
+                design,
+                output,
+                workers=workers,
+                engine=engine,
+                address=address,
+                time_limit=time_limit,
+                simulate=simulate,
+                warm=not cold,
+                progress=None if quiet else tell,
+            )
+    except KeyboardInterrupt:
+        out.print("interrupted; the same command goes on with the plans that are left")
+        raise typer.Exit(ending.INTERRUPTED) from None
     page = write_sweep_report(output)
     if not quiet:
         out.print(_said(counts))

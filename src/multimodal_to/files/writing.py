@@ -51,6 +51,18 @@ def scratch(folder: str | os.PathLike[str] | None = None) -> Iterator[Path]:
             remove()
 
 
+def make_folder(path: str | os.PathLike[str]) -> None:
+    """Make a folder, and those above it, where they are missing.
+
+    Raises:
+        OutputError: it cannot be made.
+    """
+    try:
+        os.makedirs(path, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot make the folder '{path}': {error.strerror or error}") from error
+
+
 def write_text(path: str | os.PathLike[str], text: str) -> Path:
     """Write a text as UTF-8, whole or not at all, and return the path."""
     with whole(path) as draft:

@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import Any
 
 from multimodal_to.errors import InputError, OutputError
-from multimodal_to.files.writing import whole, write_text
+from multimodal_to.files.writing import make_folder, whole, write_text
 from multimodal_to.sweeping.design import Design
 
 SWEEP_FILE, TABLE, README = "sweep.json", "table.csv", "README.md"
@@ -57,7 +57,7 @@ Made by multimodal-to. What varies: {varied}.
 
 Columns: `status` is how the solve ended, or `refused` (the task contradicts itself), `crashed` or `timed out`.
 `audit_worst` is the property that is nearest to its limit, or beyond it, and `audit_worst_over_limit` its share of the
-limit. `survived` says whether the robot stands or hovers at the end in MuJoCo, and is empty where that was not asked.
+limit. `survived` says whether the robot ends in MuJoCo as planned, and is empty where that was not asked.
 `started_from` is the index of the plan whose answer this one started from. `attempts` counts workers that were lost on
 it. Times are wall times [s], and `cpu_seconds` that of the processor.
 """
@@ -105,10 +105,7 @@ class Folder:
                     f"{stated['options']}; expected the same"
                 )
             return
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"cannot make the folder '{self.path}': {error.strerror}") from error
+        make_folder(self.path)
         varied = ", ".join(f"`{key}`" for key in design.varied) or "nothing"
         write_text(self.path / README, _README.format(count=design.count, varied=varied))
         write_text(file, json.dumps(stated, ensure_ascii=False, indent=1))
@@ -135,7 +132,7 @@ class Folder:
             OutputError: it cannot be written.
         """
         file = self.row(int(row["index"]))
-        file.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(file.parent)
         write_text(file, json.dumps(row, ensure_ascii=False))
 
     def read_row(self, index: int) -> dict[str, Any] | None:

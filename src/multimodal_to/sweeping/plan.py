@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from multimodal_to.auditing.audit import Audit, audit
-from multimodal_to.errors import LONGEST, MultimodalError, said, shortened
+from multimodal_to.errors import LONGEST, MultimodalError, OutputError, said, shortened
+from multimodal_to.files.writing import make_folder
 from multimodal_to.models.robot import Robot, load_robot
 from multimodal_to.ocp import Problem, build
 from multimodal_to.ocp.rebinding import rebind, same_terms
@@ -65,20 +66,22 @@ def perform(order: Order) -> dict[str, Any]:
         order: what to do.
 
     Raises:
-        OutputError: the trajectory or the row cannot be written; the plan is not done then.
+        OutputError: the trajectory, the row or the robot cannot be written; the plan is not done then.
     """
     started, worked, folder = time.perf_counter(), time.process_time(), Folder(path=Path(order.folder))
     found: dict[str, Any] = {}
     plan = None
     try:
         plan, found = _made(order, folder)
+    except OutputError:  # the disk is full: that says nothing of the plan
+        raise
     except MultimodalError as error:
         found = {"status": REFUSED, "message": str(error)}
     except Exception as error:  # a plan that crashes is a row that says so
         found = {"status": CRASHED, "message": shortened(f"{type(error).__name__}: {said(error)}", LONGEST)}
     if plan is not None:
         file = folder.plan(order.row.index)
-        file.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(file.parent)
         plan.save(file)
         found["plan"] = str(file.relative_to(folder.path))
     found["cpu_seconds"] = time.process_time() - worked
@@ -136,11 +139,18 @@ def _made(order: Order, folder: Folder) -> tuple[Trajectory, dict[str, Any]]:
         "robot_folder": None if source is None else str(source.relative_to(folder.path)),
     }
     if order.simulate and solution.status.solved:
-        from multimodal_to import simulation  # MuJoCo is an extra
-
-        end = simulation.tracking(simulation.play(problem.robot, solution.trajectory)).end
-        found |= {"survived": end in ("stands", "hovers"), "simulated_end": end}
+        found |= _played(problem.robot, solution.trajectory)
     return solution.trajectory, found
+
+
+def _played(robot: Robot, plan: Trajectory) -> dict[str, Any]:
+    from multimodal_to import simulation  # MuJoCo is an extra
+
+    try:
+        followed = simulation.tracking(simulation.play(robot, plan))
+    except MultimodalError as error:  # the plan stands
+        return {"survived": False, "simulated_end": str(error)}
+    return {"survived": followed.survived, "simulated_end": followed.end}
 
 
 @lru_cache(maxsize=_KEPT)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, unknown
+from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.sweeping.design import Design, Row, read_design
 from multimodal_to.sweeping.engines import Ended, Engine, Processes, Ray
 from multimodal_to.sweeping.folder import Folder
@@ -82,13 +83,15 @@ def sweep(
     Raises:
         InputError: the sweep is none, the folder holds another one, or there is no such engine.
         ScenarioError: a key is none of the scenario's, or a value is not what its key takes.
-        OutputError: the folder cannot be written, another process works on it, or Ray is not installed.
+        OutputError: the folder cannot be written, another process works on it, or Ray or MuJoCo is not installed.
     """
     if engine not in ENGINES:
         raise InputError(unknown("engine", engine, ENGINES))
     if not time_limit > 0.0:
         raise InputError(f"the time limit is {time_limit:g} s; expected a positive number")
     asked = design if isinstance(design, Design) else read_design(design)
+    if simulate:
+        mujoco_module()
     kept = Folder(path=Path(folder))
     kept.begin(asked, {"simulate": simulate, "warm": warm})
     with kept.held():

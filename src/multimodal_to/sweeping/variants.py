@@ -14,7 +14,7 @@ import tomli_w
 from lxml import etree
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.errors import InputError, ModelError, listed, shown, unknown
+from multimodal_to.errors import InputError, ModelError, OutputError, listed, shown, unknown
 from multimodal_to.files.reading import is_number, read_toml
 from multimodal_to.files.writing import scratch, write_text
 from multimodal_to.models.robot import ROBOT_FILE, Robot, bundled_robots, load_robot
@@ -55,6 +55,7 @@ def variant(robot: str, changes: Mapping[str, Any], folder: Path) -> Path:
     Raises:
         InputError: a key is unknown, or a value is not what its key takes.
         ModelError: the robot lacks a link or a jet, or what comes out is no robot.
+        OutputError: it cannot be written.
     """
     source = bundled_robots().get(robot, Path(robot))
     text = json.dumps([robot, dict(sorted(changes.items()))])
@@ -67,14 +68,19 @@ def variant(robot: str, changes: Mapping[str, Any], folder: Path) -> Path:
     ).getroot()
     for key, value in changes.items():
         _change(key, value, table, root)
-    folder.mkdir(parents=True, exist_ok=True)
-    with scratch(folder) as made:  # another process may make the same one
-        (made / table["urdf"]).parent.mkdir(parents=True, exist_ok=True)
-        etree.ElementTree(root).write(str(made / table["urdf"]), encoding="utf-8", xml_declaration=True)
-        write_text(made / ROBOT_FILE, tomli_w.dumps(table))
-        write_text(made / ROBOT_FILE, tomli_w.dumps(_on_its_feet(load_robot(robot), table, made)))
-        with suppress(OSError):  # the other was first
-            made.replace(target)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with scratch(folder) as made:  # another process may make the same one
+            (made / table["urdf"]).parent.mkdir(parents=True, exist_ok=True)
+            (made / table["urdf"]).write_bytes(
+                etree.tostring(etree.ElementTree(root), encoding="utf-8", xml_declaration=True)
+            )
+            write_text(made / ROBOT_FILE, tomli_w.dumps(table))
+            write_text(made / ROBOT_FILE, tomli_w.dumps(_on_its_feet(load_robot(robot), table, made)))
+            with suppress(OSError):  # the other was first
+                made.replace(target)
+    except OSError as error:
+        raise OutputError(f"cannot write a robot to '{folder}': {error.strerror or error}") from error
     return target
 
 
