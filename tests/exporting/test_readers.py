@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import ast
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import multimodal_to as mt
 from g1 import g1
+from multimodal_to.exporting.recording import write_rerun
+from multimodal_to.trajectory.derived import base_poses, frame_poses
 from synthetic import take_off
 
 pytestmark = [pytest.mark.readers, pytest.mark.filterwarnings("default")]
@@ -118,3 +126,52 @@ def test_locomujocos_loader_reads_our_motion(robot, plan, tmp_path):
     assert loaded.data.is_complete
     assert loaded.info.model.njnt == 30
     np.testing.assert_allclose(loaded.data.qpos[:, :3], mt.read_motion(robot, path).base_position.T)
+
+
+def test_rerun_verifies_our_recording_and_its_joints_put_a_foot_where_we_do(robot, plan, tmp_path):
+    pytest.importorskip("rerun")
+    from rerun.urdf import UrdfTree
+
+    path = write_rerun(robot, plan, tmp_path / "m.rrd")
+    verified = subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", str(path)], capture_output=True)
+    assert verified.returncode == 0, verified.stderr
+    tree, foot, knot = UrdfTree.from_file_path(robot.urdf), "left_ankle_roll_link", plan.knots // 2
+    values = dict(zip(plan.joint_names, plan.joint_positions[:, knot], strict=True))
+    above = {joint.child_link: joint for joint in tree.joints()}
+    placed, link = np.eye(4), foot
+    while link in above:
+        joint = above[link]
+        moved = joint.compute_transform(values.get(joint.name, 0.0), clamp=False)
+        step = np.eye(4)
+        step[:3, 3] = moved.translation.as_arrow_array().to_pylist()[0]
+        step[:3, :3] = Rotation.from_quat(moved.quaternion.as_arrow_array().to_pylist()[0]).as_matrix()
+        placed, link = step @ placed, joint.parent_link
+    assert link == tree.root_link().name
+    ours = np.linalg.inv(base_poses(plan)[knot]) @ frame_poses(robot, plan, foot)[knot]
+    np.testing.assert_allclose(placed, ours, atol=1e-6)
+
+
+def test_beyondmimics_own_loader_reads_our_motion(robot, plan, tmp_path):
+    torch = pytest.importorskip("torch")
+    clone = os.environ.get("WHOLE_BODY_TRACKING", "")
+    if not clone:
+        pytest.skip("WHOLE_BODY_TRACKING names no clone of whole_body_tracking")
+    (source,) = Path(clone).rglob("tasks/tracking/mdp/commands.py")
+    parts = ast.parse(source.read_text(encoding="utf-8")).body  # the rest of the file needs Isaac Sim
+    own = [part for part in parts if isinstance(part, ast.ClassDef) and part.name == "MotionLoader"]
+    space = {"np": np, "torch": torch, "os": os, "Sequence": Sequence}
+    exec(compile(ast.Module(own, []), str(source), "exec"), space)
+    path = mt.write_motion(robot, plan, tmp_path / "m.npz", flavour="beyondmimic")
+    with np.load(path) as archive:
+        bodies = archive["body_names"].tolist()
+    wanted = ["pelvis", "left_ankle_roll_link", "torso_link", "right_wrist_yaw_link"]
+    loaded = space["MotionLoader"](str(path), [bodies.index(name) for name in wanted])
+    back = mt.read_motion(robot, path)
+    assert loaded.time_step_total == back.time.size
+    for index, name in enumerate(wanted):
+        poses = frame_poses(robot, back, name)
+        np.testing.assert_allclose(loaded.body_pos_w[:, index], poses[:, :3, 3], atol=1e-6)
+        w, x, y, z = loaded.body_quat_w[:, index].double().numpy().T
+        np.testing.assert_allclose(
+            Rotation.from_quat(np.column_stack([x, y, z, w])).as_matrix(), poses[:, :3, :3], atol=1e-5
+        )

@@ -189,7 +189,9 @@ def _carried(robot: Robot, plan: Trajectory) -> Carried | None:
 @app.command("export")
 def export_file(
     file: File,
-    to: Annotated[str, typer.Option("--to", help="csv, mat, mujoco, pinocchio or motion.", autocompletion=exports)],
+    to: Annotated[
+        str, typer.Option("--to", help="csv, mat, mujoco, pinocchio, rerun or motion.", autocompletion=exports)
+    ],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write. [FILE.csv and so on]")] = None,
     flavour: Annotated[
         str | None,
@@ -226,7 +228,9 @@ def export_file(
     the_robot, trajectory = loaded(file, robot)
     suffix = FLAVOURS[flavour].suffix if flavour else EXPORTS[to][0]
     target = output or (
-        file.with_suffix(suffix) if to in ("csv", "mat") else file.with_name(f"{file.stem}-{flavour or to}{suffix}")
+        file.with_suffix(suffix)
+        if to in ("csv", "mat", "rerun")
+        else file.with_name(f"{file.stem}-{flavour or to}{suffix}")
     )
     writable_file(target, suffix)
     if flavour:

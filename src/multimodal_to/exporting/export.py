@@ -14,6 +14,7 @@ from multimodal_to.arguments import checked
 from multimodal_to.errors import OutputError
 from multimodal_to.exporting.consumers import WholeMotion, whole_motion
 from multimodal_to.exporting.layouts import layout_of
+from multimodal_to.exporting.recording import write_rerun
 from multimodal_to.files.writing import whole as whole_file
 from multimodal_to.models.joint_units import described
 from multimodal_to.models.robot import Robot
@@ -318,6 +319,7 @@ EXPORTS: Mapping[str, tuple[str, Writer]] = FrozenMapping(
         "mat": (".mat", write_mat),
         "mujoco": (".npz", write_mujoco),
         "pinocchio": (".npz", write_pinocchio),
+        "rerun": (".rrd", write_rerun),
     }
 )
 """What a trajectory can be exported to: the file's suffix and what writes it."""
