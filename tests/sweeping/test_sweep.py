@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import base64
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -21,7 +23,7 @@ from multimodal_to.sweeping.engines import Ended, Processes
 from multimodal_to.sweeping.folder import Folder
 from multimodal_to.sweeping.ordering import origins
 from multimodal_to.sweeping.plan import Order, facts
-from multimodal_to.sweeping.report import verdict
+from multimodal_to.sweeping.report import verdict, write_sweep_report
 from multimodal_to.sweeping.sweep import ATTEMPTS, Counts, counted
 from multimodal_to.sweeping.variants import variant
 from multimodal_to.trajectory import Trajectory
@@ -402,3 +404,13 @@ def test_the_table_is_parquet_too_where_pyarrow_is(tmp_path, monkeypatch):
     table = parquet.read_table(tmp_path / "s" / "table.parquet").to_pydict()
     assert table["friction"] == [0.3, 0.4]
     assert table["status"] == ["optimal", "optimal"]
+
+
+def test_the_page_shows_the_iterations_over_each_number_that_varies_also_those_of_a_place(tmp_path, monkeypatch):
+    monkeypatch.setattr(sweeping_module, "Processes", lambda workers: Fake(solved))
+    ranges = {"friction": (0.25, 0.6), "final_com": ((-0.1, 0.0, 0.5), (0.1, 0.0, 0.6))}
+    mt.sweep(small(draws=5, between=ranges), tmp_path / "s")
+    page = write_sweep_report(tmp_path / "s").read_text(encoding="utf-8")
+    (drawn,) = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', page)
+    labels = re.findall("<!-- (f[^>]+) -->", base64.b64decode(drawn).decode())
+    assert labels == ["friction", "final_com 1", "final_com 3"]

@@ -7,7 +7,7 @@ import html
 import io
 import os
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from string import Template
@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from multimodal_to.adam.spatial import Array
 from multimodal_to.files.reading import is_number
 from multimodal_to.files.writing import write_text
 from multimodal_to.sweeping.design import Design
@@ -87,6 +88,8 @@ def _share(row: Mapping[str, Any]) -> str:
 
 
 def _number(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(map(_number, value))
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
@@ -99,22 +102,28 @@ def _figures(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:
     """
     from matplotlib.figure import Figure
 
-    numeric = [key for key in keys if all(is_number(row["inputs"].get(key)) for row in rows)]
     shown = [row for row in rows if row.get("iterations")]
-    if not shown or not numeric:
+    varied = {
+        name: values
+        for key in keys
+        for name, values in _numeric(key, [row["inputs"].get(key) for row in shown]).items()
+        if np.ptp(values) > 0.0
+    }
+    if not varied:
         return ""
-    across = min(len(numeric), 3)
-    down = -(-len(numeric) // across)
+    across = min(len(varied), 3)
+    down = -(-len(varied) // across)
     figure = Figure(figsize=(4.2 * across, 3.2 * down), layout="constrained")
     axes = np.atleast_1d(figure.subplots(down, across, sharey=True)).ravel()
-    for axis, key in zip(axes, numeric, strict=False):
-        for name, some in _by_verdict(shown):
-            points = [(row["inputs"][key], row["iterations"]) for row in some]
-            axis.scatter(*zip(*points, strict=True), s=18, color=_COLOURS.get(name, _FAILED), label=name)
+    iterations, verdicts = np.array([row["iterations"] for row in shown]), np.array([verdict(row) for row in shown])
+    for axis, (key, values) in zip(axes, varied.items(), strict=False):
+        for name in dict.fromkeys(verdicts.tolist()):
+            of = verdicts == name
+            axis.scatter(values[of], iterations[of], s=18, color=_COLOURS.get(name, _FAILED), label=name)
         axis.set_xlabel(key)
         axis.set_ylabel("iterations")
         axis.grid(alpha=0.3)
-    for axis in axes[len(numeric) :]:
+    for axis in axes[len(varied) :]:
         axis.remove()
     axes[0].legend(fontsize=8)
     stream = io.BytesIO()
@@ -123,8 +132,17 @@ def _figures(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:
     return f'<img alt="iterations over each input" src="data:image/svg+xml;base64,{data}">'
 
 
-def _by_verdict(rows: Sequence[Mapping[str, Any]]) -> Iterable[tuple[str, list[Mapping[str, Any]]]]:
-    groups: dict[str, list[Mapping[str, Any]]] = {}
-    for row in rows:
-        groups.setdefault(verdict(row), []).append(row)
-    return groups.items()
+def _numeric(key: str, values: Sequence[Any]) -> dict[str, Array]:
+    """Return the numbers of an input by name, (rows,) each; those of a list, as of a place, one by one.
+
+    Args:
+        key: of the input.
+        values: of the input in each row.
+    """
+    if not values:
+        return {}
+    if all(is_number(value) for value in values):
+        return {key: np.array(values, dtype=float)}
+    if all(isinstance(value, list) and len(value) == len(values[0]) and all(map(is_number, value)) for value in values):
+        return {f"{key} {number}": part for number, part in enumerate(np.array(values, dtype=float).T, start=1)}
+    return {}
