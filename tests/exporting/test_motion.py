@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 from hopper import hopper
+from multimodal_to.cli.tasks import given
 from multimodal_to.errors import InputError, ModelError, TrajectoryError
 from multimodal_to.exporting.export import write_mujoco, write_pinocchio
 from multimodal_to.exporting.layouts import layout_of
@@ -226,6 +227,14 @@ def rewritten(path, change):
 def without_names(arrays):
     for name in ("joint_names", "body_names", "flavour"):
         del arrays[name]
+
+
+def test_a_motion_of_another_program_is_a_start_guess_of_a_task_with_jets_and_of_one_without(ironcub, plan, tmp_path):
+    file = write_motion(ironcub, plan, tmp_path / "m.npz", flavour="mjlab")
+    for settings, jets in (([], plan.jet_names), (["jets=false", "terminal=standing"], ())):
+        task = given("take-off", settings, "ironcub", paper=False, warm_start=file, resume=None, quiet=True)
+        assert task.start.jet_names == jets
+        np.testing.assert_allclose(task.start.joint_positions[:, 0], plan.joint_positions[:, 0], atol=1e-9)
 
 
 @pytest.mark.parametrize("flavour", ["mjlab", "beyondmimic", "holosoma"])

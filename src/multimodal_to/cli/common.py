@@ -110,17 +110,18 @@ def loaded(file: Path, robot: str) -> tuple[Robot, Trajectory]:
     return the_robot, trajectory
 
 
-def of_others(file: Path, robot: str) -> tuple[Robot, Trajectory] | None:
+def of_others(file: Path, robot: str, *, jets: bool = True) -> tuple[Robot, Trajectory] | None:
     """Return a motion of a tracker or a simulator, or of bare arrays, with its robot; None for the library's own files.
 
     Args:
         file: of the motion.
         robot: by name or folder.
+        jets: read it as a motion of the robot with its jets.
     """
     stored = {} if file.suffix.lower() == ".csv" else read_archive(file, leave_out_pickled=True)
     if "format_version" in stored:
         return None
-    the_robot = load_robot(robot)
+    the_robot = load_robot(robot) if jets else load_robot(robot).with_jets(())
     if not stored or flavours_of(stored):
         return the_robot, read_motion(the_robot, file)
     return the_robot, import_arrays(the_robot, file)

@@ -59,9 +59,9 @@ def given(
     if resume is None:
         if name is None:
             raise InputError("nothing to solve; expected the NAME of a scenario, or --resume FILE")
-        start = None if warm_start is None else _motion(warm_start, robot)
         formulation = Formulation.paper() if paper else Formulation.executable()
         asked = chosen(name, settings, paper=paper)
+        start = None if warm_start is None else _motion(warm_start, robot, jets=asked.jets)
         whose = robot_for(asked, robot, file="" if quiet else name)
         return Task(scenario=asked, robot=whose, formulation=formulation, start=start)
     if warm_start is not None:
@@ -97,14 +97,15 @@ def given(
     return Task(scenario=scenario, robot=whose, formulation=formulation, start=start, initial=initial)
 
 
-def _motion(file: Path, robot: str) -> Trajectory:
+def _motion(file: Path, robot: str, *, jets: bool) -> Trajectory:
     """Return the motion of a file, also of another program's where the robot is named.
 
     Args:
         file: of the motion.
         robot: name or folder; empty where it is not named.
+        jets: whether the task uses them.
     """
-    others = of_others(file, robot) if robot else None
+    others = of_others(file, robot, jets=jets) if robot else None
     return Trajectory.load(file) if others is None else others[1]
 
 

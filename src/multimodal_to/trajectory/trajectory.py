@@ -238,7 +238,10 @@ class Trajectory(Value):
         stored = read_archive(source)
         version = stored.get("format_version")
         if version is None or version.shape != () or version.dtype.kind not in "iu":
-            raise TrajectoryError(f"'{source}' is not a trajectory file of this library: it has no format_version")
+            raise TrajectoryError(
+                f"'{source}' is not a trajectory file of this library: it has no format_version; where the "
+                "robot is named, by --robot or to read_motion, motions of other programs are read"
+            )
         if int(version) not in FORMATS:
             raise TrajectoryError(
                 f"'{source}' has format version {version}; this release reads {min(FORMATS)} to {FORMAT_VERSION}"
