@@ -222,6 +222,9 @@ def test_what_cannot_be_written_ends_the_sweep_and_is_no_row_so_that_the_plan_is
         plan.perform(order_of(row, tmp_path))
     (tmp_path / what).unlink()
     assert Folder(path=tmp_path).read_row(0) is None
+    if what != "robots":
+        first = plan.perform(order_of(row, tmp_path))
+        assert plan.perform(order_of(row, tmp_path)) == first  # also its times: it is not made twice
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")

@@ -69,6 +69,8 @@ def perform(order: Order) -> dict[str, Any]:
         OutputError: the trajectory, the row or the robot cannot be written; the plan is not done then.
     """
     started, worked, folder = time.perf_counter(), time.process_time(), Folder(path=Path(order.folder))
+    if (done := folder.read_row(order.row.index)) is not None:  # by a worker that was lost before it could say so
+        return done
     found: dict[str, Any] = {}
     plan = None
     try:
