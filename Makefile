@@ -74,7 +74,7 @@ constraints:
 	rm -rf .venv-constraints
 	$(PYTHON) -m venv .venv-constraints
 	.venv-constraints/bin/python -m pip install --quiet --upgrade "pip>=25.1"
-	.venv-constraints/bin/python -m pip install --quiet --editable '.[ray,table]' --group dev --group docs
+	.venv-constraints/bin/python -m pip install --quiet --editable '.[ray,rerun,table]' --group dev --group docs
 	{ echo "# The tested versions: names and versions that every install of the Makefile uses."; \
 	  echo "# Written by make constraints with $$(.venv-constraints/bin/python --version)."; \
 	  .venv-constraints/bin/python -m pip list --format=freeze --exclude-editable --exclude pip --exclude setuptools; \

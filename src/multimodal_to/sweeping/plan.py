@@ -150,6 +150,8 @@ def _played(robot: Robot, plan: Trajectory) -> dict[str, Any]:
 
     try:
         followed = simulation.tracking(simulation.play(robot, plan))
+    except OutputError:  # MuJoCo is not installed here
+        raise
     except MultimodalError as error:  # the plan stands
         return {"survived": False, "simulated_end": str(error)}
     return {"survived": followed.survived, "simulated_end": followed.end}
