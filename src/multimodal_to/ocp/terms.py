@@ -270,7 +270,7 @@ class Constraint:
         when: for which problems the constraint exists; by default for all.
         rigid: `relax` does not let the rows give way unless it is told to.
         present: which of its rows exist at which of the knots where it holds; by default all.
-        lazy: `Ipopt` leaves the rows out until an answer without them misses one: for rows that seldom hold with
+        lazy: `Ipopt` leaves the rows out while the motion is far from their limits: for rows that seldom hold with
             equality, and that make every step cost much more.
 
     Raises:

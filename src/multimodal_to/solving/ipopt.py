@@ -43,8 +43,8 @@ _WARM_PUSH = 1e-6
 """The same for an answer to start from, which touches its bounds."""
 
 
-_NEAR = 0.01
-"""How near to its limit a lazy row of an answer is that may be missed by the next one, in solver units."""
+_NEAR = 0.1
+"""How near to its limit a lazy row may be where a pass begins that leaves it out, in solver units."""
 
 
 _BARRIER_TOLERANCE = 50.0
@@ -70,8 +70,8 @@ class Ipopt:
     one factorisation and is long, and a start guess that meets hardly any row becomes a motion that nearly meets them.
     The exact pass goes on from there.
 
-    Lazy rows are left out at first. Where the answer misses one, a further exact pass goes on from it with all rows. An
-    answer of before that is at the limit of a lazy row is gone on from with all rows at once.
+    The rough pass has all rows. Where it ends far from the limits of all lazy rows, as an answer of before may be, the
+    pass that follows leaves these out. Where its answer misses one, a further exact pass goes on with all rows.
 
     Raises:
         InputError: an option is out of its range, or there is no linear solver of that name.
@@ -164,11 +164,12 @@ class Ipopt:
         """
         started, iterations, x, solver = time.perf_counter(), 0, start.x, self
         facts: dict[str, Any] = {}
-        passes = list(_passes(start))
-        whole = start.record is not None and problem.misses_lazy_rows(x, -_NEAR)
-        posed = _Posed.of(problem, whole=whole or problem.eager is None)
+        passes, answered = list(_passes(start)), False
+        posed = _Posed.of(problem, whole=True)
         while passes:
             which = passes[0]
+            if which is not Pass.ROUGH and posed.whole and not answered and not problem.misses_lazy_rows(x, -_NEAR):
+                posed = _Posed.of(problem, whole=False)
             seconds = max(self.time_limit - (time.perf_counter() - started), 1e-3)
             options = solver.options(max(self.max_iterations - iterations, 1), seconds, which)
             with stages.offered(options, posed.structure, start.kept) as structured:
@@ -186,9 +187,8 @@ class Ipopt:
             status = self.status(message)
             if status in (Status.TIME_LIMIT, Status.STOPPED) or iterations >= self.max_iterations:
                 break
-            missed = status.solved and problem.misses_lazy_rows(x, self.violation_tolerance)
-            if not passes and not posed.whole and missed:
-                posed = _Posed.of(problem, whole=True)
+            if status.solved and not posed.whole and problem.misses_lazy_rows(x, self.violation_tolerance):
+                posed, answered = _Posed.of(problem, whole=True), True
                 passes.append(Pass.EXACT)
         return Ending(
             x=x,
