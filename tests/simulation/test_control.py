@@ -6,7 +6,6 @@ from dataclasses import asdict, fields, replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import multimodal_to as mt
 from drones import HOP, drone
@@ -29,7 +28,6 @@ from multimodal_to.simulation import (
     tracking,
 )
 from multimodal_to.simulation.controller import Belief, drawn
-from multimodal_to.simulation.footing import Footing
 from multimodal_to.simulation.known import Known
 from multimodal_to.simulation.look_ahead import Feedback, LookAhead
 from multimodal_to.simulation.noise import Estimate, Noise
@@ -183,87 +181,6 @@ def test_thrusts_stay_with_the_plan_while_the_feet_carry_the_robot(at_the_end):
     standing = advice(*at_the_end, 100, place=np.array([0.01, 0.0, -1e-3])).throttle
     flying = advice(*at_the_end, 3400, place=np.array([0.01, 0.0, 0.0])).throttle
     assert np.abs(standing).max() < 0.2 * np.abs(flying).max()
-
-
-class Feet:
-    """The step up with a robot that is where a test puts it, and what is done about its feet."""
-
-    def __init__(self, robot, plan, thrusts):
-        rows = reference(robot, plan, np.arange(0.0, plan.duration, 2e-3))
-        self.belief, self.plan = Belief(robot, plan), replace(rows, thrust=thrusts * rows.thrust)
-        self.footing = Footing(self.belief, self.plan, 2e-3, 1.0)
-        loaded = self.plan.contact_forces[:, :, 2].sum(axis=1) > 0.1 * robot.weight
-        self.touch_down = int(loaded.argmax())
-
-    def put(self, step, joints=0.0, off=(0.0, 0.0, 0.0), pitch=0.0):
-        """The robot beside a row of the plan, turned about its CoM, with other joints."""
-        belief, plan, robot = self.belief, self.plan, self.belief.simulation.robot
-        turn = np.array([[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]])
-        state = mt.State(
-            base_position=plan.com[step] + off + turn @ (plan.base_position[step] - plan.com[step]),
-            base_quaternion_xyzw=Rotation.from_matrix(turn @ plan.rotation[step]).as_quat(),
-            joint_positions=plan.joints[step] + joints,
-            base_linear_velocity=plan.com_velocity[step],
-            base_angular_velocity=np.zeros(3),
-            joint_velocities=np.zeros(plan.joints.shape[1]),
-            thrust=np.zeros(len(robot.jets)),
-            thrust_rate=np.zeros(len(robot.jets)),
-        )
-        belief.put(state)
-
-    def settled(self, step, **where):
-        """What is done once the lag is over."""
-        for _ in range(400):
-            self.put(step, **where)
-            done = self.footing.step(step)
-        return done
-
-    def middles(self):
-        points = self.belief.data.geom_xpos[self.belief.simulation.points]
-        return np.array([points[list(own)].mean(axis=0) for own in self.belief.simulation.robot.feet.values()])
-
-    def slant(self):
-        points = self.belief.data.geom_xpos[self.belief.simulation.points]
-        return max(np.ptp(points[list(own), 2]) for own in self.belief.simulation.robot.feet.values())
-
-
-@pytest.fixture(scope="module")
-def feet(ironcub, step_up):
-    return lambda thrusts=1.0: Feet(ironcub, step_up, thrusts)
-
-
-def test_feet_of_a_robot_that_tilts_in_the_air_come_down_level(feet):
-    some = feet()
-    before = some.touch_down - 20
-    some.put(before)
-    slant = some.slant()
-    some.put(before, pitch=0.05)
-    assert some.slant() > slant + 5e-3
-    joints = some.settled(before, pitch=0.05).joints
-    some.put(before, joints=joints, pitch=0.05)
-    assert some.slant() == pytest.approx(slant, abs=2e-3)
-
-
-@pytest.mark.parametrize(("thrusts", "follow"), [(0.0, 1.0), (1.0, 0.0)])
-def test_feet_come_down_where_the_robot_falls_and_where_the_plan_has_them_if_thrusts_carry_it(feet, thrusts, follow):
-    """A robot that falls 2 cm too far puts its feet 2 cm farther in the world; jets bring it back by themselves."""
-    some = feet(thrusts)
-    before = some.touch_down - 20
-    some.put(before)
-    planned = some.middles()
-    for off in ([0.02, 0.0, 0.0], [0.0, -0.02, 0.0]):
-        joints = some.settled(before, off=off).joints
-        some.put(before, off=off, joints=joints)
-        np.testing.assert_allclose(some.middles() - planned, follow * np.array([off, off]), atol=5e-3)
-
-
-def test_the_plan_goes_with_the_feet_that_stand(feet):
-    """Of two feet that stand beside their places by the same, the legs stay as planned."""
-    some = feet()
-    end, off = len(some.plan.com) - 10, [0.02, 0.01, -1e-3]
-    beside = some.settled(end, off=off)
-    np.testing.assert_allclose(beside.place, [0.02, 0.01, 0.0], atol=2e-3)
-    assert np.abs(beside.joints).max() < 0.01
 
 
 @pytest.mark.parametrize("scenario", ["take-off", "step-up"])

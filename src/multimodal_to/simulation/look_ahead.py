@@ -95,7 +95,7 @@ class Feedback:
         self._forgetting = FORGETTING.of(belief.simulation.robot.units)
         self._sums = np.zeros(6)
 
-    def advise(self, state: State, step: int, shift: Array | None = None) -> Advice:
+    def advise(self, state: State, step: int) -> Advice:
         """Return what is added to a row of the plan.
 
         The attitude in ξ is that of the whole robot, whose angular velocity is I⁻¹ hω: the base's, and what the joints
@@ -104,13 +104,12 @@ class Feedback:
         Args:
             state: as it was measured, which `belief` has taken over.
             step: row of the plan.
-            shift: by which the plan for the CoM moves, world axes [m], (3,); by default it does not.
         """
         data, plan = self._belief.data, self._plan
         stands = bool(data.ncon)
         gains = self._standing if stands else self._flying
         row = min(round(step / self._every), len(gains.turning) - 1)
-        place = data.subtree_com[1] - plan.com[step] - (0.0 if shift is None else shift)
+        place = data.subtree_com[1] - plan.com[step]
         turn = rotation_vector(self._belief.rotation @ plan.rotation[step].T)
         turn = turn + gains.turning[row] @ (state.joint_positions - plan.joints[step])
         rate = -self._sums / self._forgetting if stands else np.concatenate([place, turn])

@@ -11,11 +11,11 @@ from multimodal_to.arguments import checked
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.simulation.controller import Belief, Command, Servos, row_of, servo
-from multimodal_to.simulation.footing import Footing
 from multimodal_to.simulation.known import Known
 from multimodal_to.simulation.look_ahead import Feedback, LookAhead
+from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
-from multimodal_to.simulation.stabiliser import Balance, BalanceGains, Seen, correct
+from multimodal_to.simulation.stabiliser import Balance, BalanceGains, correct
 from multimodal_to.simulation.turbines import around
 from multimodal_to.trajectory import Trajectory
 
@@ -29,7 +29,6 @@ class ServoGains(BalanceGains):
 
     stiffness: float = 1.2  # K of each joint's servo [m g L/rad]
     damping: float = 0.16  # D of each joint's servo [m g L √(L/g)/rad]
-    placement: float = 1.5  # k: share of the capture point's error that a foot follows out of a flight [1]
     look_ahead: LookAhead = field(default_factory=LookAhead)
 
 
@@ -52,7 +51,6 @@ class ServoController:
         self._servo: tuple[Array, Array]
         self._balance: Balance
         self._feedback: Feedback
-        self._footing: Footing
 
     @property
     def period(self) -> float:
@@ -73,16 +71,8 @@ class ServoController:
         self._robot, self._since = robot, since
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
         units, gains = robot.units, self._gains
-        feet = np.array([contact.foot for contact in robot.contacts], dtype=np.str_)
-        self._balance = Balance(
-            gains=gains,
-            units=units,
-            inertia=inertia(robot),
-            friction=self._belief.friction,
-            same_foot=feet[:, None] == feet,
-        )
+        self._balance = Balance(gains=gains, units=units, inertia=inertia(robot), friction=self._belief.friction)
         self._feedback = Feedback(self._belief, self._plan, PERIOD, gains.look_ahead, Known.of(robot, plan))
-        self._footing = Footing(self._belief, self._plan, PERIOD, gains.placement)
         count = len(robot.joint_names)
         self._servo = servo(units, count, gains.stiffness, gains.damping)
         if first:
@@ -99,35 +89,40 @@ class ServoController:
         assert self._belief is not None
         self._belief.put(state)
         plan, step = self._plan, row_of(time - self._since, PERIOD, self._plan)
-        if not self._stabilise:
-            return self._command(step, plan.joints[step], plan.torques[step], plan.throttle[step])
-        footing = self._footing.step(step)
-        advice = self._feedback.advise(state, step, footing.place)
-        joints = plan.joints[step] + self._shift + footing.joints
-        torques = plan.torques[step] - self._belief.simulation.coupling.T @ self._belief.of_thrusts(
-            state.thrust - plan.thrust[step]
+        torques, throttle = plan.torques[step], plan.throttle[step]
+        if self._stabilise:
+            advice = self._feedback.advise(state, step)
+            throttle = around(self._robot.jets, plan, step, advice.throttle)
+            simulation, data = self._belief.simulation, self._belief.data
+            correction = correct(simulation, data, plan, step, state.thrust, self._balance)
+            joints = advice.joints + correction.joints
+            self._shift = self._shift + (joints - self._shift) * PERIOD / JOINT_LAG
+            torques = torques - self._borne_by_joints(state, step, correction.contact_forces)
+        servos = Servos(
+            positions=plan.joints[step] + self._shift,
+            velocities=plan.joint_velocities[step],
+            stiffness=self._servo[0],
+            damping=self._servo[1],
         )
-        servo = self._servo[0] * (joints - state.joint_positions)
-        servo += self._servo[1] * (plan.joint_velocities[step] - state.joint_velocities)
-        seen = Seen(thrust=state.thrust, shift=footing.place, asked=torques + servo)
-        correction = correct(self._belief.simulation, self._belief.data, plan, step, seen, self._balance)
-        self._shift = self._shift + (advice.joints + correction.joints - self._shift) * PERIOD / JOINT_LAG
-        throttle = around(self._robot.jets, plan, step, advice.throttle)
-        return self._command(step, joints, torques + correction.torques, throttle)
+        return Command(torques=torques, throttle=throttle, servos=servos)
 
-    def _command(self, step: int, joints: Array, torques: Array, throttle: Array) -> Command:
-        """Return what servos at some joint positions, torques and throttles are together.
+    def _borne_by_joints(self, state: State, step: int, forces: Array) -> Array:
+        """Return Jᵀ f of the thrusts' difference from the plan and of the forces that are asked of the ground.
 
         Args:
+            state: with the thrusts as they are.
             step: row of the plan.
-            joints: where the servos hold the joints [rad or m], (n,).
-            torques: beside the servos [N m or N], (n,).
-            throttle: of the jets [%], (jets,).
+            forces: that are asked of the ground beside the plan's [N], (contacts, 3).
         """
-        stiffness, damping = self._servo
-        velocities = self._plan.joint_velocities[step]
-        servos = Servos(positions=joints, velocities=velocities, stiffness=stiffness, damping=damping)
-        return Command(torques=torques, throttle=throttle, servos=servos)
+        assert self._belief is not None
+        mujoco, data, simulation = mujoco_module(), self._belief.data, self._belief.simulation
+        total = self._belief.of_thrusts(state.thrust - self._plan.thrust[step])
+        jacobian = np.zeros((3, simulation.model.nv))
+        for index, force in enumerate(forces):
+            if force.any():
+                mujoco.mj_jacGeom(simulation.model, data, jacobian, None, simulation.points[index])
+                total += jacobian.T @ force
+        return np.asarray(simulation.coupling.T @ total)
 
 
 @checked

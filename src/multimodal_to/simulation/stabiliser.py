@@ -7,8 +7,7 @@ Wanted is a change of the momentum's rate, with starred the plan and I the robot
 less what the thrusts add that are not as planned. Two stages share it out by least squares: z minimises
 ‖W (A z − Δ)‖² + ‖z / σ‖².
 
-1. Forces at the contact points that the plan loads, of feet that touch; they stay inside the friction pyramid. Where a
-   motor is asked for more than its limit, what its joint shall bear is in A as well, so that the other foot takes load.
+1. Forces at the contact points that the plan loads, of feet that touch; they stay inside the friction pyramid.
 2. Joints between base and jets, which turn and shift the thrusts and lean the upper body. They see the moment about the
    planned centre of pressure, about which the ground cannot help, and of it what a stance as wide as the planned one
    leaves: B Δ of `_unborne`. They count the less the more the feet carry.
@@ -20,7 +19,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.units import Units
@@ -29,8 +27,6 @@ from multimodal_to.simulation.reference import Reference
 from multimodal_to.trajectory.derived import flight_force
 
 FORCE_WEIGHT, MOMENT_WEIGHT = 440.0, 1250.0  # W, of forces [1/(m g)] and of moments [1/(m g L)]
-TORQUE_WEIGHT = 50.0  # W, of torques beyond the motors' limits [1/(m g L)]
-RELIEF = 0.5  # at most, of a motor's limit [1]
 JOINT_MAX = 0.3  # how far a joint leaves the plan [rad or m]
 
 
@@ -55,16 +51,6 @@ class Balance:
     units: Units
     inertia: Array  # I about the CoM in the base's axes [kg m²], (3, 3)
     friction: float  # Coulomb's μ [1]
-    same_foot: NDArray[np.bool_]  # which contact points are of one foot, (contacts, contacts)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Seen:
-    """What the controller knows of the robot now, beside its motion."""
-
-    thrust: Array  # of each jet as it is [N], (jets,)
-    shift: Array  # by which the plan for the CoM moves, world axes [m], (3,)
-    asked: Array  # torque of the joints' motors without a correction [N m or N], (n,)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,12 +58,11 @@ class Correction:
     """What is added to the plan."""
 
     contact_forces: Array  # Δf in world axes [N], (contacts, 3)
-    torques: Array  # −Jᵀ Δf, with which the joints bear them [N m or N], (n,)
     joints: Array  # Δs [rad or m], (n,)
 
 
 def correct(
-    simulation: SimulationModel, data: Any, plan: Reference, step: int, seen: Seen, balance: Balance
+    simulation: SimulationModel, data: Any, plan: Reference, step: int, thrust: Array, balance: Balance
 ) -> Correction:
     """Return what to add to row `step` of the plan in the state of `data`; nothing where no foot stands.
 
@@ -86,31 +71,23 @@ def correct(
         data: MuJoCo's `MjData` of the state, with subtree velocities known.
         plan: with rows.
         step: row of the plan.
-        seen: what else the controller knows.
+        thrust: of each jet as it is [N], (jets,).
         balance: gains, and what else is known of the robot.
     """
-    robot, forces, thrust = simulation.robot, np.zeros((len(simulation.robot.contacts), 3)), seen.thrust
+    robot, forces = simulation.robot, np.zeros((len(simulation.robot.contacts), 3))
     joints = np.zeros(len(robot.joint_names))
     com, points = data.subtree_com[1], data.geom_xpos[simulation.points]
     loads = np.maximum(plan.contact_forces[step][:, 2], 0.0)
-    touches = balance.same_foot @ touching(simulation, data)
-    standing = np.flatnonzero((balance.same_foot @ loads > flight_force(robot)) & touches)  # loaded by the plan
+    feet = np.array([contact.foot for contact in robot.contacts], dtype=np.str_)
+    same_foot = feet[:, None] == feet
+    touches = same_foot @ np.isin(simulation.points, data.contact.geom)
+    standing = np.flatnonzero((same_foot @ loads > flight_force(robot)) & touches)  # loaded by the plan
     if not standing.size:
-        return Correction(contact_forces=forces, torques=joints, joints=joints)
+        return Correction(contact_forces=forces, joints=joints)
     axes = -data.site_xmat[simulation.jets].reshape(-1, 3, 3)[:, :, 2]
     wrenches = np.hstack([axes, np.cross(data.site_xpos[simulation.jets] - com, axes)])
-    lacking = _wanted(simulation, data, plan, step, balance, seen.shift) - (thrust - plan.thrust[step]) @ wrenches
-    planned, arms = plan.contact_forces[step][standing], points[standing] - com
-    jacobian = _jacobian(simulation, data, standing)
-    forces[standing] = _shared_out(planned, arms, lacking, balance)
-    limit = robot.joint_limits.effort
-    asked = seen.asked - jacobian.T @ forces[standing].ravel()
-    beyond = np.abs(asked) > limit
-    if beyond.any():  # other points bear what these motors cannot
-        relief = asked - np.clip(asked, -limit, limit)
-        relief = (seen.asked - asked + np.clip(relief, -RELIEF * limit, RELIEF * limit))[beyond]
-        forces[standing] = _shared_out(planned, arms, lacking, balance, (jacobian[:, beyond].T, relief))
-    torques = -jacobian.T @ forces[standing].ravel()
+    lacking = _wanted(simulation, data, plan, step, balance) - (thrust - plan.thrust[step]) @ wrenches
+    forces[standing] = _shared_out(plan.contact_forces[step][standing], points[standing] - com, lacking, balance)
     load = float(loads[standing].sum())
     free = max(0.0, 1.0 - load / balance.units.force)
     if robot.jets and free > 0.0:
@@ -121,16 +98,7 @@ def correct(
         effect = effect_of_joints(simulation, data, origin, thrust, stands=True)[3:]
         spread = np.full(joints.size, free * balance.gains.joint_spread)
         joints = _ridge(effect, moment, spread, np.full(3, MOMENT_WEIGHT / balance.units.moment))
-    return Correction(contact_forces=forces, torques=torques, joints=np.clip(joints, -JOINT_MAX, JOINT_MAX))
-
-
-def _jacobian(simulation: SimulationModel, data: Any, points: NDArray[np.int64]) -> Array:
-    """Return how contact points move with the joints, (3 points, n)."""
-    rows = np.zeros((3 * len(points), simulation.model.nv))
-    for index, point in enumerate(points):
-        part = rows[3 * index : 3 * index + 3]
-        mujoco_module().mj_jacGeom(simulation.model, data, part, None, simulation.points[point])
-    return np.asarray(rows @ simulation.coupling)
+    return Correction(contact_forces=forces, joints=np.clip(joints, -JOINT_MAX, JOINT_MAX))
 
 
 def effect_of_joints(simulation: SimulationModel, data: Any, origin: Array, thrust: Array, *, stands: bool) -> Array:
@@ -177,13 +145,6 @@ def _unborne(arms: Array, shares: Array, radius: float) -> Array:
     return np.asarray(radius**2 * np.linalg.inv(spread + radius**2 * np.eye(3)))
 
 
-def touching(simulation: SimulationModel, data: Any) -> NDArray[np.bool_]:
-    """Return which contact points touch the ground in the state of MuJoCo's `MjData` of a model, (contacts,)."""
-    touches = np.zeros(simulation.model.ngeom, dtype=bool)
-    touches[data.contact.geom] = True
-    return np.asarray(touches[simulation.points])
-
-
 def rotation_vector(rotation: Array) -> Array:
     """Return Log R [rad], (3,)."""
     mujoco = mujoco_module()
@@ -193,9 +154,7 @@ def rotation_vector(rotation: Array) -> Array:
     return vector
 
 
-def _wanted(
-    simulation: SimulationModel, data: Any, plan: Reference, step: int, balance: Balance, shift: Array
-) -> Array:
+def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, balance: Balance) -> Array:
     """Return Δl̇ [N] and Δḣω [N m] about the CoM, (6,).
 
     Args:
@@ -204,10 +163,9 @@ def _wanted(
         plan: with rows.
         step: row of the plan.
         balance: gains, and what else is known of the robot.
-        shift: by which the plan for the CoM moves, world axes [m], (3,).
     """
     gains, rate = balance.gains, balance.units.frequency
-    away, slow = plan.com[step] + shift - data.subtree_com[1], plan.com_velocity[step] - data.subtree_linvel[1]
+    away, slow = plan.com[step] - data.subtree_com[1], plan.com_velocity[step] - data.subtree_linvel[1]
     linear = simulation.robot.mass * (gains.com_stiffness * rate**2 * away + gains.com_damping * rate * slow)
     turn = rotation_vector(plan.rotation[step] @ data.xmat[1].reshape(3, 3).T)
     spin = plan.angular_momentum[step] - data.subtree_angmom[1]
@@ -216,9 +174,7 @@ def _wanted(
     return np.concatenate([linear, angular])
 
 
-def _shared_out(
-    planned: Array, arms: Array, wanted: Array, balance: Balance, relief: tuple[Array, Array] | None = None
-) -> Array:
+def _shared_out(planned: Array, arms: Array, wanted: Array, balance: Balance) -> Array:
     """Return Δf of contact points with planned forces and arms from the CoM, (points, 3).
 
     Args:
@@ -226,15 +182,11 @@ def _shared_out(
         arms: from the CoM to the points, world axes [m], (points, 3).
         wanted: change of force [N] and moment [N m] about the CoM, world axes, (6,).
         balance: gains, and what else is known of the robot.
-        relief: Jᵀ of some joints, (joints, 3 points), and what Jᵀ Δf shall be there [N m or N], (joints,).
     """
     friction = balance.friction
     wrenches = np.hstack([np.vstack([np.eye(3), skew(arm)]) for arm in arms])
     spread = (balance.gains.load_spread * planned[:, 2:] * [friction, friction, 1.0]).ravel()
     weights = np.repeat([FORCE_WEIGHT / balance.units.force, MOMENT_WEIGHT / balance.units.moment], 3)
-    if relief is not None:
-        wrenches, wanted = np.vstack([wrenches, relief[0]]), np.concatenate([wanted, relief[1]])
-        weights = np.concatenate([weights, np.full(len(relief[1]), TORQUE_WEIGHT / balance.units.moment)])
     total = planned + _ridge(wrenches, wanted, spread, weights).reshape(-1, 3)
     total[:, 2] = np.maximum(total[:, 2], 0.0)
     reach = friction * total[:, 2:]
