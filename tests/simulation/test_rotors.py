@@ -54,7 +54,7 @@ def test_a_quadrotor_without_feet_plays_a_climb_back_and_hovers(tmp_path):
         terminal=mt.Terminal.HOVER,
         interval_min=0.05,
         interval_max=0.1,
-        weights=mt.Weights(com_velocity=10.0, angular_momentum=100.0, throttle=1e-3, throttle_rate=1e-3),
+        weights=mt.Weights(com_velocity=1e7, angular_momentum=1e8, throttle=1e3, throttle_rate=1e3),
     )
     assert not mt.doctor(robot, climb).findings
     solution = mt.solve(mt.build(robot, climb))
