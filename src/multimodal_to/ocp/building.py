@@ -86,6 +86,7 @@ def build(
         scale=scale,
     )
     _refuse_no_numbers(problem, outline.stages)
+    _make_functions(problem)
     return problem
 
 
@@ -152,19 +153,26 @@ def _eager(stages: Sequence[NamedStage], lazy: Collection[str], size: int, knots
     return None if rows.size == first else EagerRows(Nlp(stages=tuple(kept), size=size, knots=knots), rows)
 
 
+def _make_functions(problem: Problem) -> None:
+    """Make what a solve will ask for; where the start guess misses a lazy row, it will ask for the curvature of all."""
+    lazy = problem.eager is not None and not problem.misses_lazy_rows(problem.guess, 0.0)
+    problem.nlp.make("cost_hessian", *(() if lazy else ("hessian",)))
+    if lazy:
+        assert problem.eager is not None
+        problem.eager.nlp.make("rows", "objective", "gradient", "jacobian", "hessian")
+
+
 def _refuse_no_numbers(problem: Problem, stages: Sequence[NamedStage]) -> None:
-    """Make sure that every term and its derivatives are numbers at the start guess; of lazy rows only the values.
+    """Make sure that every term and its derivatives are numbers at the start guess.
 
     Raises:
         FormulationError: one is not.
     """
     guess, empty = problem.guess, np.zeros(0)
-    nlp = problem.eager.nlp if problem.eager else problem.nlp
-    index = problem.eager.index if problem.eager else np.arange(problem.row_lower.size)
-    jacobian, slopes = nlp.jacobian(guess, empty)[1], np.zeros(problem.row_lower.size)
-    of_row = index[np.array(jacobian.sparsity().get_triplet()[0], dtype=np.int64)]
-    np.add.at(slopes, of_row, np.array(jacobian.nonzeros()))
-    for what, numbers in (("value", problem.rows_at(guess)), ("derivative", slopes)):
+    values, jacobian = problem.nlp.jacobian(guess, empty)
+    slopes = np.zeros(problem.row_lower.size)
+    np.add.at(slopes, np.array(jacobian.sparsity().get_triplet()[0], dtype=np.int64), np.array(jacobian.nonzeros()))
+    for what, numbers in (("value", np.array(values).ravel()), ("derivative", slopes)):
         for name, rows in problem.rows.items():
             if (bad := np.flatnonzero(~np.isfinite(numbers[rows.index]))).size:
                 where = f"knot {rows.knots[bad[0]]}" + " ".join(("", str(rows.components[bad[0]]))).rstrip()
@@ -178,7 +186,7 @@ def _refuse_no_numbers(problem: Problem, stages: Sequence[NamedStage]) -> None:
                 f"the term '{name}': its value at the start guess is no finite number; expected a function that is "
                 "smooth there"
             )
-    if not np.isfinite(np.array(nlp.gradient(guess, empty)[1])).all():
+    if not np.isfinite(np.array(problem.nlp.gradient(guess, empty)[1])).all():
         names = [name for named in stages for name in _steep_costs(problem, named)]
         raise FormulationError(
             f"the term '{listed(names)}': its derivative at the start guess is no finite number; expected a function "

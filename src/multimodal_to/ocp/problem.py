@@ -140,7 +140,13 @@ class Problem(Value):
     @checked
     def rows_at(self, x: Array) -> Array:
         """Return g(x), in solver units."""
-        return np.array(self.nlp.rows(x)).ravel()
+        given, rows = np.ascontiguousarray(x, dtype=float), np.empty(self.row_lower.size)
+        if rows.size:
+            buffer, evaluate = self.nlp.rows.buffer()  # a call with arrays copies them number by number
+            buffer.set_arg(0, given.data)
+            buffer.set_res(0, rows.data)
+            evaluate()
+        return rows
 
     @checked
     def scaled_violation(self, x: Array, g: Array) -> float:

@@ -196,6 +196,11 @@ class Nlp:
         """Return the same without the curvature of the rows."""
         return self._curvature([stage.cost_hessian() for stage in self.stages])
 
+    def make(self, *names: str) -> None:
+        """Make some of the functions now."""
+        for name in names:
+            getattr(self, name)
+
     @property
     def taped(self) -> bool:
         """Return whether all of them that were asked for so far are evaluated by tapes."""
