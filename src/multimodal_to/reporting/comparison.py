@@ -76,10 +76,10 @@ SOLVES = (
     ),
     Column(
         title="in the solver [s]",
-        of_run=lambda run: f"{run.solution.solve_time:.0f}" if run.solution else UNKNOWN,
+        of_run=lambda run: f"{run.solution.solve_time:.2f}" if run.solution else UNKNOWN,
         of_published=lambda paper: _number(paper.solve_time, ".0f"),
     ),
-    Column(title="in all [s]", of_run=lambda run: _number(run.whole_time, ".0f")),
+    Column(title="in all [s]", of_run=lambda run: _number(run.whole_time, ".1f")),
     Column(
         title="duration [s]",
         of_run=lambda run: f"{run.report.duration:.1f}",
