@@ -159,7 +159,7 @@ def _make_functions(problem: Problem) -> None:
     problem.nlp.make("cost_hessian", *(() if lazy else ("hessian",)))
     if lazy:
         assert problem.eager is not None
-        problem.eager.nlp.make("rows", "objective", "gradient", "jacobian", "hessian")
+        problem.eager.nlp.make("rows", "jacobian", "hessian")
 
 
 def _refuse_no_numbers(problem: Problem, stages: Sequence[NamedStage]) -> None:

@@ -22,6 +22,8 @@ from multimodal_to.trajectory.quantities import XYZ
 
 ON_GROUND = Sized(1e-5, "m")
 """Largest height of a contact point that stands: a sole has more corners than a plane needs."""
+_MIDDLE = Sized(0.5 * ON_GROUND.value, ON_GROUND.unit)
+"""Height of the points that hold a sole, so that its other corners are in the middle of their range."""
 _LINE = 1e-3
 """Points nearer to a line than this share of its length do not hold a body from turning about it [1]."""
 
@@ -225,9 +227,7 @@ GIVEN_OFF = Constraint(
 GIVEN_ON = Constraint(
     name="given_on",
     value=constraints.heights,
-    within=equal(
-        Sized(0.5 * ON_GROUND.value, "m")
-    ),  # so that the other corners of a sole are in the middle of their range
+    within=equal(_MIDDLE),
     unit="m",
     labels=each("contact"),
     when=_gives,

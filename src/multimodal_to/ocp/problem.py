@@ -59,7 +59,7 @@ class BoundSet(RowSet):
 class EagerRows(Value):
     """The rows of a problem that are not lazy."""
 
-    nlp: Nlp  # with these rows alone
+    nlp: Nlp  # with these rows alone; its costs are those of the problem
     index: NDArray[np.int64]  # into g
 
 

@@ -17,7 +17,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import check_fields
 from multimodal_to.errors import InputError, SolverError
 from multimodal_to.native.stage_solver import KktStructure
-from multimodal_to.ocp.problem import Problem
+from multimodal_to.ocp.problem import EagerRows, Problem
 from multimodal_to.ocp.transcription import Nlp
 from multimodal_to.solving import linear_solvers, machine, stages
 from multimodal_to.solving.solver import Ending, StartPoint, Watch
@@ -165,11 +165,10 @@ class Ipopt:
         started, iterations, x, solver = time.perf_counter(), 0, start.x, self
         facts: dict[str, Any] = {}
         passes, answered = list(_passes(start)), False
-        posed = _Posed.of(problem, whole=True)
         while passes:
             which = passes[0]
-            if which is not Pass.ROUGH and posed.whole and not answered and not problem.misses_lazy_rows(x, -_NEAR):
-                posed = _Posed.of(problem, whole=False)
+            whole = which is Pass.ROUGH or answered or problem.misses_lazy_rows(x, -_NEAR)
+            posed = _Posed.of(problem, None if whole else problem.eager)
             seconds = max(self.time_limit - (time.perf_counter() - started), 1e-3)
             options = solver.options(max(self.max_iterations - iterations, 1), seconds, which)
             with stages.offered(options, posed.structure, start.kept) as structured:
@@ -188,7 +187,7 @@ class Ipopt:
             if status in (Status.TIME_LIMIT, Status.STOPPED) or iterations >= self.max_iterations:
                 break
             if status.solved and not posed.whole and problem.misses_lazy_rows(x, self.violation_tolerance):
-                posed, answered = _Posed.of(problem, whole=True), True
+                answered = True
                 passes.append(Pass.EXACT)
         return Ending(
             x=x,
@@ -215,7 +214,8 @@ def _passes(start: StartPoint) -> tuple[Pass, ...]:
 class _Posed:
     """What IPOPT is given of a problem: with all rows, or without the lazy ones."""
 
-    nlp: Nlp
+    costs: Nlp  # its costs
+    rows: Nlp  # its rows, and the curvature of both
     lower: Array  # of x
     upper: Array
     row_lower: Array  # of its rows
@@ -224,18 +224,18 @@ class _Posed:
     whole: bool
 
     @classmethod
-    def of(cls, problem: Problem, *, whole: bool) -> _Posed:
-        """Return it for a problem; `whole` asks for all rows."""
-        eager = None if whole else problem.eager
-        nlp, rows = (problem.nlp, slice(None)) if eager is None else (eager.nlp, eager.index)
-        bounds = problem.lower, problem.upper, problem.row_lower[rows], problem.row_upper[rows]
-        return cls(nlp, *bounds, structure=stages.structure(stages.variable_knots(problem), *bounds), whole=whole)
+    def of(cls, problem: Problem, eager: EagerRows | None) -> _Posed:
+        """Return it for a problem, with `eager` rows alone or with all rows."""
+        rows, some = (problem.nlp, slice(None)) if eager is None else (eager.nlp, eager.index)
+        bounds = problem.lower, problem.upper, problem.row_lower[some], problem.row_upper[some]
+        structure = stages.structure(stages.variable_knots(problem), *bounds)
+        return cls(problem.nlp, rows, *bounds, structure=structure, whole=eager is None)
 
 
 @machine.one_blas_thread()
 def _run(posed: _Posed, x: Array, ipopt_options: dict[str, Any], watcher: _Watcher) -> tuple[Array, dict[str, Any]]:
     """Run IPOPT once from x; return where it ended, answer or not, and its statistics."""
-    nlp, symbol = posed.nlp, cs.MX.sym("x", posed.lower.size)
+    costs, rows, symbol = posed.costs, posed.rows, cs.MX.sym("x", posed.lower.size)
     options: dict[str, Any] = {
         "print_time": False,
         "no_nlp_grad": True,  # for the multipliers of parameters, of which there are none
@@ -243,13 +243,13 @@ def _run(posed: _Posed, x: Array, ipopt_options: dict[str, Any], watcher: _Watch
         "record_time": True,
         "error_on_fail": False,
         "show_eval_warnings": False,  # IPOPT takes a shorter step where a row is no number
-        "jac_g": nlp.jacobian,
-        "grad_f": nlp.gradient,
-        "hess_lag": nlp.cost_hessian if watcher.which is Pass.ROUGH else nlp.hessian,
+        "jac_g": rows.jacobian,
+        "grad_f": costs.gradient,
+        "hess_lag": costs.cost_hessian if watcher.which is Pass.ROUGH else rows.hessian,
         "iteration_callback": watcher,
         "ipopt": ipopt_options,
     }
-    functions = {"x": symbol, "f": nlp.objective(symbol), "g": nlp.rows(symbol)}
+    functions = {"x": symbol, "f": costs.objective(symbol), "g": rows.rows(symbol)}
     try:
         solver = cs.nlpsol("solver", "ipopt", functions, options)  # goes with its memory when this solve ends
         ended = solver(x0=x, lbx=posed.lower, ubx=posed.upper, lbg=posed.row_lower, ubg=posed.row_upper)
