@@ -43,6 +43,7 @@ from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.trajectory import QUANTITIES, Trajectory, rules
 from multimodal_to.trajectory.derived import frame_poses
+from pages import put
 
 FORMULATIONS: dict[str, Callable[[], mt.Formulation]] = {
     "paper": mt.Formulation.paper,
@@ -52,7 +53,6 @@ FORMULATIONS: dict[str, Callable[[], mt.Formulation]] = {
 RULES: dict[str, IntegrationRule] = {"backward-euler": BACKWARD_EULER, "leapfrog": LEAPFROG}
 FREE_FLIGHT = "free-flight"
 PARTS = (1, 2, 4)
-BEGIN, END = "<!-- refinement: begin -->", "<!-- refinement: end -->"
 ROUNDING = 1e-4  # errors below it have no order [mm, °, N]
 ROWS = (
     constraints.momentum_dynamics,
@@ -362,15 +362,6 @@ def with_orders(columns: list[list[float]], parts: tuple[int, ...]) -> list[list
     return [list(row) for row in zip(*texts, strict=True)]
 
 
-def put(page: Path, text: str) -> None:
-    """Set the text between the marks of a page."""
-    before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)
-    _, mark, after = rest.partition(END)
-    if not mark:
-        raise SystemExit(f"{page} lacks the marks {BEGIN} and {END}")
-    page.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}", encoding="utf-8")
-
-
 def main() -> None:
     """Run a study and print its table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -394,7 +385,7 @@ def main() -> None:
     found = {name: study(controls_of(name), chosen, parts, options.starts) for name in names}
     Console().print(controls_table(found))
     if options.into:
-        put(options.into, markdown(found))
+        put(options.into, "refinement", markdown(found))
 
 
 if __name__ == "__main__":

@@ -38,6 +38,7 @@ from multimodal_to.models.robot import ROBOT_FILE, Robot, bundled_robots
 from multimodal_to.models.terrain import Stairs
 from multimodal_to.models.units import Sized
 from multimodal_to.scenarios.scenario import Scenario
+from pages import put
 
 OWN_SCENARIOS = "ironcub"
 """The robot whose tasks are the bundled scenarios."""
@@ -54,7 +55,6 @@ SIZES: Mapping[str, tuple[str, float]] = {
 SPREAD = 0.3
 """By how much of itself the size of a starter task varies, either way [1]."""
 HEIGHT, DISTANCE = Sized(0.05, "m"), Sized(0.2, "m")
-BEGIN, END = "<!-- robustness: begin -->", "<!-- robustness: end -->"
 TIME_LIMIT = 600.0  # of a solve [s]; generous, so that a loaded machine does not decide
 
 
@@ -224,15 +224,6 @@ def markdown(outcomes: Sequence[Outcome]) -> str:
     return "\n".join(lines)
 
 
-def put(page: Path, text: str) -> None:
-    """Set the text between the marks of a page."""
-    before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)
-    _, mark, after = rest.partition(END)
-    if not mark:
-        raise SystemExit(f"{page} lacks the marks {BEGIN} and {END}")
-    page.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}", encoding="utf-8")
-
-
 def main() -> None:
     """Run all variations and print what became of them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -272,7 +263,7 @@ def main() -> None:
     text = markdown(sorted(mine, key=lambda one: (options.robot.index(one.robot), tasks_order(one), one.index)))
     print(text)
     if options.into is not None:
-        put(options.into, text)
+        put(options.into, "robustness", text)
 
 
 def tasks_order(outcome: Outcome) -> int:

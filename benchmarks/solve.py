@@ -43,6 +43,7 @@ from unittest.mock import patch
 import multimodal_to as mt
 from multimodal_to.scenarios.files import load
 from multimodal_to.solving.machine import versions
+from pages import put
 
 HIGHER = 0.02  # by so much the target of the warm solve [m]
 TIGHTER = 1e-2  # what --tight multiplies the tolerance with
@@ -50,7 +51,7 @@ GRIDS = (35, 70, 140, 280)  # knots of --growth
 GROWTH_ITERATIONS = 40  # of --growth, half of them rough
 REFERENCE = Path(__file__).with_name("paper_reference.py")
 REFERENCES = ("take-off", "walk-to-fly", "jump")  # that it has
-MARKS = "<!-- solve: {} -->", "<!-- solve executable: {} -->"  # on the page: of the paper's problem, of the default one
+MARKS = "solve", "solve executable"  # on the page: of the paper's problem, of the default one
 UNKNOWN = "–"
 
 Figures = dict[str, Any]
@@ -296,16 +297,6 @@ def this_machine() -> str:
     )
 
 
-def put(page: Path, text: str) -> None:
-    """Set the text between the marks of a page."""
-    begin, end = (MARKS[executable()].format(word) for word in ("begin", "end"))
-    before, _, rest = page.read_text(encoding="utf-8").partition(begin)
-    _, mark, after = rest.partition(end)
-    if not mark:
-        raise SystemExit(f"{page} lacks the marks {begin} and {end}")
-    page.write_text(f"{before}{begin}\n{text}{end}{after}", encoding="utf-8")
-
-
 def main() -> None:
     """Measure and write the tables."""
     parser = argparse.ArgumentParser(description="Time scenarios.")
@@ -334,7 +325,7 @@ def main() -> None:
     chosen.output.write_text(text, encoding="utf-8")
     print(text)
     if chosen.into:
-        put(chosen.into, text)
+        put(chosen.into, MARKS[executable()], text)
 
 
 if __name__ == "__main__":

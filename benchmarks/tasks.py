@@ -21,8 +21,8 @@ from pathlib import Path
 import multimodal_to as mt
 from multimodal_to.files.packages import package_file
 from multimodal_to.trajectory.derived import footsteps
+from pages import put
 
-BEGIN, END = "<!-- tasks: begin -->", "<!-- tasks: end -->"
 BY_HAND = 0
 """Lines of configuration that were written by hand, for all robots together: there is no place for any."""
 HEAD = ("robot", "task", "status", "audit", "moves", "iterations", "seconds", "lines by hand")
@@ -150,15 +150,6 @@ def markdown(rows: Sequence[Row], refused: Mapping[str, Mapping[str, Sequence[st
     return "\n".join(lines)
 
 
-def put(page: Path, text: str) -> None:
-    """Set the text between the marks of a page."""
-    before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)
-    _, mark, after = rest.partition(END)
-    if not mark:
-        raise SystemExit(f"{page} lacks the marks {BEGIN} and {END}")
-    page.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}", encoding="utf-8")
-
-
 def main() -> None:
     """Try, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -178,7 +169,7 @@ def main() -> None:
         text = markdown(rows, {name: reasons for name, (_, reasons) in found.items()})
     print(f"\n{text}")
     if chosen.into:
-        put(chosen.into, text)
+        put(chosen.into, "tasks", text)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import pytest
 import multimodal_to as mt
 import solve
 from multimodal_to.scenarios.files import to_toml
+from pages import put
 
 PAGE = Path(__file__).parents[2] / "docs" / "performance.md"
 
@@ -67,14 +68,14 @@ def test_the_table_goes_between_the_marks_of_the_page(tmp_path):
     text = solve.table(["a", "b"], [{"iterations": 94.0, "build [s]": 0.12345}, {"iterations": 7.0}])
     assert text == "|  | a | b |\n| -- | -- | -- |\n| iterations | 94 | 7 |\n| build [s] | 0.123 | – |\n"
     for _ in range(2):  # the second time it takes the place of the first
-        solve.put(copy, text)
+        put(copy, "solve", text)
     written = copy.read_text(encoding="utf-8")
     assert written.count("| iterations | 94 | 7 |") == 1
     assert written.startswith("# Performance")
     assert "## What it is compared with" in written
     (tmp_path / "other.md").write_text("no marks", encoding="utf-8")
     with pytest.raises(SystemExit, match="lacks the marks"):
-        solve.put(tmp_path / "other.md", text)
+        put(tmp_path / "other.md", "solve", text)
 
 
 def test_another_grid_lasts_as_long():
