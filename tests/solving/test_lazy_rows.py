@@ -2,27 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import multimodal_to as mt
 from multimodal_to.solving import ipopt
-
-
-@pytest.fixture(scope="module")
-def stand():
-    """A short problem without jets, so that its answers come fast: the CoM goes down by 2 cm."""
-    return replace(
-        mt.scenarios.jump(),
-        knots=10,
-        mid_height_min=None,
-        final_com=(0.0, 0.0, 0.55),
-        interval_min=0.1,
-        interval_max=0.1,
-        allowances={},
-    )
 
 
 def force_rates(interval, parameters):

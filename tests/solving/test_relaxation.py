@@ -18,19 +18,6 @@ LEGS = 0.6
 
 
 @pytest.fixture(scope="module")
-def stand():
-    return replace(
-        mt.scenarios.jump(),
-        knots=10,
-        mid_height_min=None,
-        final_com=(0.0, 0.0, 0.55),
-        interval_min=0.1,
-        interval_max=0.1,
-        allowances={},
-    )
-
-
-@pytest.fixture(scope="module")
 def too_high(ironcub, stand):
     """To stand with the CoM 10 cm higher than the reach of the legs."""
     return mt.build(ironcub, replace(stand, final_com=(0.0, 0.0, 0.70)))

@@ -14,20 +14,6 @@ from multimodal_to.solving.linear_solvers import choose
 
 
 @pytest.fixture(scope="module")
-def stand(ironcub):
-    """A short problem without jets, so that its answers come fast: the CoM goes down by 2 cm."""
-    return replace(
-        mt.scenarios.jump(),
-        knots=10,
-        mid_height_min=None,
-        final_com=(0.0, 0.0, 0.55),
-        interval_min=0.1,
-        interval_max=0.1,
-        allowances={},
-    )
-
-
-@pytest.fixture(scope="module")
 def answer(ironcub, stand):
     return mt.solve(mt.build(ironcub, stand))
 
