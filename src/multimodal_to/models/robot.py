@@ -179,6 +179,11 @@ class Robot(Value):
         jets = _offsets(self.kindyn, self.home, [jet.frame for jet in self.jets])
         return proportions.standing_height(contacts, jets)
 
+    @checked
+    def pose_at_home(self, frame: str) -> Array:
+        """Return the pose of a link or frame at home in the world [m], (4, 4)."""
+        return np.array(self.kindyn.forward_kinematics(frame, self.home.base_transform, self.home.joint_positions))
+
     @cached_property
     def units(self) -> Units:
         """Return the robot's own units: m, L and g, and how many contact points share the weight."""

@@ -91,7 +91,7 @@ def _of_feet(robot: Robot) -> Iterator[str]:
 
 
 def _of_jets(robot: Robot) -> Iterator[str]:
-    up = np.array([-_pose(robot, jet.frame)[2, 2] for jet in robot.jets])
+    up = np.array([-robot.pose_at_home(jet.frame)[2, 2] for jet in robot.jets])
     lift = float(np.maximum(up, 0.0) @ [jet.thrust_max for jet in robot.jets])
     if lift < robot.weight:
         yield f"at home the jets lift at most {lift:.0f} N of the weight, {robot.weight:.0f} N"
@@ -99,12 +99,8 @@ def _of_jets(robot: Robot) -> Iterator[str]:
         yield f"at home these jets push the robot down: {_some(down)}; see `thrust_axis`"
 
 
-def _pose(robot: Robot, frame: str) -> Array:
-    return np.array(robot.kindyn.forward_kinematics(frame, robot.home.base_transform, robot.home.joint_positions))
-
-
 def _places(robot: Robot, frames: tuple[str, ...]) -> Array:
-    return np.array([_pose(robot, frame)[:3, 3] for frame in frames])
+    return np.array([robot.pose_at_home(frame)[:3, 3] for frame in frames])
 
 
 def _some(names: list[str]) -> str:

@@ -41,7 +41,7 @@ def draw_home(robot: Robot, *, capsules: bool = True) -> Figure:
     triangles, colours = _surfaces(robot)
     shells = [_capsule(robot, capsule) for capsule in robot.link_capsules] if capsules else []
     frames = [contact.frame for contact in robot.contacts]
-    points = np.array([_pose(robot, frame)[:3, 3] for frame in frames]).reshape(-1, 3)
+    points = np.array([robot.pose_at_home(frame)[:3, 3] for frame in frames]).reshape(-1, 3)
     seen = np.vstack([triangles.reshape(-1, 3), points, robot.home.base_position])
     low, high = seen.min(axis=0), seen.max(axis=0)
     size = float((high - low).max())
@@ -53,7 +53,7 @@ def draw_home(robot: Robot, *, capsules: bool = True) -> Figure:
         axes.scatter(*points.T, color=_CONTACT, s=22, depthshade=False, zorder=4)
         _draw_axes(axes, robot, 0.15 * size)
         for jet in robot.jets:
-            pose = _pose(robot, jet.frame)
+            pose = robot.pose_at_home(jet.frame)
             axes.quiver(*pose[:3, 3], *(-0.25 * size * pose[:3, 2]), color=_JET, linewidth=2.0, zorder=5)
         middle = 0.5 * (low + high)
         for name, centre in zip("xyz", middle, strict=True):
@@ -79,10 +79,6 @@ def _draw_axes(axes: Any, robot: Robot, length: float) -> None:
         axes.plot(*np.column_stack([pose[:3, 3], pose[:3, 3] + length * pose[:3, column]]), color=colour, zorder=5)
 
 
-def _pose(robot: Robot, frame: str) -> Array:
-    return np.array(robot.kindyn.forward_kinematics(frame, robot.home.base_transform, robot.home.joint_positions))
-
-
 def _surfaces(robot: Robot) -> tuple[Array, Array]:
     """Return the triangles of all links in the world [m], (count, 3, 3), and their colours, (count, 4)."""
     with warnings.catch_warnings():
@@ -93,7 +89,7 @@ def _surfaces(robot: Robot) -> tuple[Array, Array]:
     for visual in visuals:
         part = None if visual.part is None else next(parts)
         own = _primitive(visual) if part is None else part.vertices[part.faces]
-        pose = _pose(robot, visual.link) @ visual.transform
+        pose = robot.pose_at_home(visual.link) @ visual.transform
         own = own @ pose[:3, :3].T + pose[:3, 3]
         normals = np.cross(own[:, 1] - own[:, 0], own[:, 2] - own[:, 0])
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -123,6 +119,6 @@ def _capsule(robot: Robot, capsule: Capsule) -> Array:
     turn = np.asarray(trimesh.geometry.align_vectors([0.0, 0.0, 1.0], axis))  # type: ignore[no-untyped-call]
     own = np.array(mesh.triangles, dtype=float)
     own[:, :, 2] -= 0.5 * (own[:, :, 2].min() + own[:, :, 2].max())
-    pose = _pose(robot, capsule.frame)
+    pose = robot.pose_at_home(capsule.frame)
     placed = own @ turn[:3, :3].T + 0.5 * (capsule.start + capsule.end)
     return np.asarray(placed @ pose[:3, :3].T + pose[:3, 3])

@@ -261,9 +261,4 @@ def _on_its_feet(before: Robot, table: dict[str, Any], folder: Path) -> dict[str
 
 
 def _lowest(robot: Robot) -> float:
-    home = robot.home
-    heights = [
-        float(np.array(robot.kindyn.forward_kinematics(name, home.base_transform, home.joint_positions))[2, 3])
-        for name in robot.contact_names
-    ]
-    return min(heights)
+    return min(float(robot.pose_at_home(name)[2, 3]) for name in robot.contact_names)

@@ -18,13 +18,14 @@ _LINE = 0.02
 
 def looks(robot: Robot) -> float:
     """Return 1 where a robot looks along x of the world at home, −1 where its soles point back from their ankles."""
-    bodies, home = robot.kindyn.tree.bodies, robot.home
+    tree = robot.kindyn.tree
 
-    def along(frame: str) -> float:
-        return float(robot.kindyn.forward_kinematics(frame, home.base_transform, home.joint_positions)[0, 3])
+    def ahead(name: str) -> float:
+        ankle = tree.bodies[tree.frame(name).body].name
+        return float(robot.pose_at_home(name)[0, 3] - robot.pose_at_home(ankle)[0, 3])
 
     ways = [
-        along(robot.contact_names[point]) - along(bodies[robot.kindyn.tree.frame(robot.contact_names[point]).body].name)
+        ahead(robot.contact_names[point])
         for points in robot.feet.values()
         if len(points) > 2 and robot.joint_names
         for point in points
@@ -58,13 +59,7 @@ def refuse_footless(robot: Robot, name: str) -> None:
     """
     if not robot.contacts:
         raise ScenarioError(f"{robot.name} has no contact points; expected a robot with feet for '{name}'")
-    posture = robot.home
-    places = np.array(
-        [
-            np.array(robot.kindyn.forward_kinematics(one, posture.base_transform, posture.joint_positions))[:2, 3]
-            for one in robot.contact_names
-        ]
-    )
+    places = np.array([robot.pose_at_home(name)[:2, 3] for name in robot.contact_names])
     if len(places) < 3 or np.linalg.svd(places - places.mean(axis=0))[1][1] < _LINE * robot.standing_height:
         raise ScenarioError(
             f"{robot.name} has its contact points on a line, about which it falls; expected feet that hold it upright "

@@ -117,16 +117,8 @@ def land(robot: Robot, *, height: float | None = None) -> Scenario:
 
 def _units(robot: Robot) -> Units:
     """Return the robot's own units with ℓ as the length."""
-    com, home = robot.com_at(robot.home), robot.home
-    away = [
-        float(
-            np.linalg.norm(
-                np.array(robot.kindyn.forward_kinematics(jet.frame, home.base_transform, home.joint_positions))[:3, 3]
-                - com
-            )
-        )
-        for jet in robot.jets
-    ]
+    com = robot.com_at(robot.home)
+    away = [float(np.linalg.norm(robot.pose_at_home(jet.frame)[:3, 3] - com)) for jet in robot.jets]
     return replace(robot.units, length=max(robot.standing_height, float(np.mean(away or [0.0]))))
 
 
