@@ -13,6 +13,7 @@ import refinement
 from multimodal_to import scenarios
 from multimodal_to.auditing.findings import Motion
 from multimodal_to.auditing.integrator import Controls
+from pages import marks
 
 ORDERS = {"backward-euler": 1, "leapfrog": 2}
 """Each rule with its order."""
@@ -84,7 +85,7 @@ def test_plans_on_finer_steps_are_solved_and_shown_with_their_orders(monkeypatch
 
 def test_a_study_of_controls_prints_each_rule_on_each_step_and_fills_a_page(monkeypatch, capsys, tmp_path):
     page = tmp_path / "page.md"
-    page.write_text(f"before\n{refinement.BEGIN}\nold\n{refinement.END}\nafter\n", encoding="utf-8")
+    page.write_text("before\n{}\nold\n{}\nafter\n".format(*marks("refinement")), encoding="utf-8")
     monkeypatch.setenv("COLUMNS", "160")
     monkeypatch.setattr(sys, "argv", ["refinement", "free-flight", "--parts", "1", "2", "--into", str(page)])
     refinement.main()
