@@ -183,6 +183,17 @@ def test_thrusts_stay_with_the_plan_while_the_feet_carry_the_robot(at_the_end):
     assert np.abs(standing).max() < 0.2 * np.abs(flying).max()
 
 
+def test_the_plan_is_followed_where_the_feet_stand_and_goes_back_in_flight(at_the_end):
+    aside = np.array([0.03, -0.01, -5e-4])  # 0.5 mm into the ground, so that the feet touch
+    for _ in range(500):
+        standing = advice(*at_the_end, 0, place=aside)
+    np.testing.assert_allclose(standing.footing, [0.03, -0.01, 0.0], atol=1e-4)
+    np.testing.assert_allclose(standing.errors[:2], 0.0, atol=1e-4)
+    for _ in range(2000):
+        flying = advice(*at_the_end, 3400, place=aside)
+    np.testing.assert_allclose(flying.errors[:2], aside[:2], atol=1e-4)
+
+
 @pytest.mark.parametrize("scenario", ["take-off", "step-up"])
 def test_a_plan_survives_one_push_with_torques_within_their_limits(ironcub, take_off, step_up, scenario):
     """From before the feet change to the end; 50 N on the iRonCub."""

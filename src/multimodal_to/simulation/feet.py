@@ -64,3 +64,21 @@ class PlannedFeet:
             acceleration=np.asarray(np.gradient(velocity, period, axis=1)),
             load=load,
         )
+
+    def beside(self, belief: Belief, step: int) -> tuple[Array, float]:
+        """Return how far feet stand beside the plan, level, in the mean by planned load [m], (3,); and that load [N].
+
+        Only feet that touch count.
+
+        Args:
+            belief: in the state as it is.
+            step: row of the plan.
+        """
+        simulation, data = belief.simulation, belief.data
+        touches, away, total = np.isin(simulation.points, data.contact.geom), np.zeros(3), 0.0
+        for foot, own in enumerate(self.members):
+            load = float(self.load[foot, step])
+            if load > 0.0 and touches[own].any():
+                away += load * (data.geom_xpos[simulation.points[own]].mean(axis=0) - self.middle[foot, step])
+                total += load
+        return away * [1.0, 1.0, 0.0] / max(total, np.finfo(float).tiny), total

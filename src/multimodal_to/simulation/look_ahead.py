@@ -12,6 +12,13 @@ taken over. With the errors ξ = (x, ẋ, θ, hω, ∫x, ∫θ, T, Ṫ) of CoM, 
 each input has a spread, which is what it may do without much cost: the throttle u; forces at the contact points, as far
 as the plan loads them, whose sum is F and M; and the joints between base and jets, which turn and shift the thrusts as
 far as the feet do not carry. Where no jet can be turned, the base leans to move aside: θ × f_T.
+
+The plan is followed where the feet stand. A foot that came down beside its place, or slipped, stays where it is; a CoM
+that is held above the planned place is then no longer above the foot. So x counts from the plan moved by δ, with
+
+    δ̇ = (β δ_f − δ) / τ,
+
+δ_f how far the feet stand beside the plan and β = min(1, load / load_full). In flight δ goes to zero.
 """
 
 from __future__ import annotations
@@ -26,6 +33,7 @@ from multimodal_to.models.jet import Jet, JetModel
 from multimodal_to.models.state import State
 from multimodal_to.models.units import Sized
 from multimodal_to.simulation.controller import Belief
+from multimodal_to.simulation.feet import PlannedFeet
 from multimodal_to.simulation.known import Known
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference
@@ -36,6 +44,9 @@ SETTLING = 4.0  # how long the end is held for the gains there [s]
 TURBINE = 0.5  # how long a turbine takes, roughly [s]
 FLYING = 0.4  # joints help only while the feet carry less than this [m g]
 FORGETTING = Sized(1.0, "s")  # time constant with which sums of errors go while a foot stands
+FOOTING_LOAD = 0.3  # feet that carry this much or more say where the plan is followed [m g]
+FOOTING_LAG = Sized(0.1, "s")  # τ while a foot stands
+FOOTING_FADE = Sized(0.5, "s")  # τ in flight
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +80,7 @@ class Advice:
     """What the feedback sees and what it adds to the plan."""
 
     errors: Array  # ξ, SI units, (18 + 2 jets,)
+    footing: Array  # δ: the plan is followed so far beside itself, level [m], (3,)
     throttle: Array  # [%], (jets,)
     joints: Array  # [rad or m], (n,)
 
@@ -93,7 +105,8 @@ class Feedback:
         self._standing = self._gains(how, stands=True)
         self._flying = self._gains(how, stands=False) if belief.simulation.robot.jets else self._standing
         self._forgetting = FORGETTING.of(belief.simulation.robot.units)
-        self._sums = np.zeros(6)
+        self._sums, self._footing = np.zeros(6), np.zeros(3)
+        self.feet = PlannedFeet.along(belief, plan, period)
 
     def advise(self, state: State, step: int) -> Advice:
         """Return what is added to a row of the plan.
@@ -109,7 +122,8 @@ class Feedback:
         stands = bool(data.ncon)
         gains = self._standing if stands else self._flying
         row = min(round(step / self._every), len(gains.turning) - 1)
-        place = data.subtree_com[1] - plan.com[step]
+        self._follow_feet(step)
+        place = data.subtree_com[1] - plan.com[step] - self._footing
         turn = rotation_vector(self._belief.rotation @ plan.rotation[step].T)
         turn = turn + gains.turning[row] @ (state.joint_positions - plan.joints[step])
         rate = -self._sums / self._forgetting if stands else np.concatenate([place, turn])
@@ -126,7 +140,15 @@ class Feedback:
             ]
         )
         joints = np.clip(gains.joints[row] @ errors, -JOINT_MAX, JOINT_MAX)
-        return Advice(errors=errors, throttle=gains.throttle[row] @ errors, joints=joints)
+        return Advice(errors=errors, footing=self._footing, throttle=gains.throttle[row] @ errors, joints=joints)
+
+    def _follow_feet(self, step: int) -> None:
+        """Let δ go on by a period."""
+        units = self._belief.simulation.robot.units
+        beside, load = self.feet.beside(self._belief, step)
+        lag = FOOTING_LAG if load > 0.0 else FOOTING_FADE
+        target = min(load / (FOOTING_LOAD * units.force), 1.0) * beside
+        self._footing = self._footing + (target - self._footing) * self._period / lag.of(units)
 
     def _gains(self, how: LookAhead, *, stands: bool) -> _Gains:
         belief, plan, robot = self._belief, self._plan, self._belief.simulation.robot

@@ -94,7 +94,7 @@ class ServoController:
             advice = self._feedback.advise(state, step)
             throttle = around(self._robot.jets, plan, step, advice.throttle)
             simulation, data = self._belief.simulation, self._belief.data
-            correction = correct(simulation, data, plan, step, state.thrust, self._balance)
+            correction = correct(simulation, data, plan, step, state.thrust, self._balance, advice.footing)
             joints = advice.joints + correction.joints
             self._shift = self._shift + (joints - self._shift) * PERIOD / JOINT_LAG
             torques = torques - self._borne_by_joints(state, step, correction.contact_forces)

@@ -2,10 +2,10 @@
 
 Wanted is a change of the momentum's rate, with starred the plan and I the robot's inertia about its CoM, in base axes:
 
-    Δl̇ = m (K_x (x* − x) + D_x (ẋ* − ẋ)),   Δḣω = R* I R*ᵀ K_R Log(R* Rᵀ) + D_h (hω* − hω),
+    Δl̇ = m (K_x (x* + δ − x) + D_x (ẋ* − ẋ)),   Δḣω = R* I R*ᵀ K_R Log(R* Rᵀ) + D_h (hω* − hω),
 
-less what the thrusts add that are not as planned. Two stages share it out by least squares: z minimises
-‖W (A z − Δ)‖² + ‖z / σ‖².
+less what the thrusts add that are not as planned. The plan is followed where the feet stand, δ beside itself: see
+`look_ahead`. Two stages share it out by least squares: z minimises ‖W (A z − Δ)‖² + ‖z / σ‖².
 
 1. Forces at the contact points that the plan loads, of feet that touch; they stay inside the friction pyramid.
 2. Joints between base and jets, which turn and shift the thrusts and lean the upper body. They see the moment about the
@@ -62,7 +62,7 @@ class Correction:
 
 
 def correct(
-    simulation: SimulationModel, data: Any, plan: Reference, step: int, thrust: Array, balance: Balance
+    simulation: SimulationModel, data: Any, plan: Reference, step: int, thrust: Array, balance: Balance, footing: Array
 ) -> Correction:
     """Return what to add to row `step` of the plan in the state of `data`; nothing where no foot stands.
 
@@ -73,6 +73,7 @@ def correct(
         step: row of the plan.
         thrust: of each jet as it is [N], (jets,).
         balance: gains, and what else is known of the robot.
+        footing: by how much the feet stand beside the plan [m], (3,).
     """
     robot, forces = simulation.robot, np.zeros((len(simulation.robot.contacts), 3))
     joints = np.zeros(len(robot.joint_names))
@@ -86,7 +87,7 @@ def correct(
         return Correction(contact_forces=forces, joints=joints)
     axes = -data.site_xmat[simulation.jets].reshape(-1, 3, 3)[:, :, 2]
     wrenches = np.hstack([axes, np.cross(data.site_xpos[simulation.jets] - com, axes)])
-    lacking = _wanted(simulation, data, plan, step, balance) - (thrust - plan.thrust[step]) @ wrenches
+    lacking = _wanted(simulation, data, plan, step, balance, footing) - (thrust - plan.thrust[step]) @ wrenches
     forces[standing] = _shared_out(plan.contact_forces[step][standing], points[standing] - com, lacking, balance)
     load = float(loads[standing].sum())
     free = max(0.0, 1.0 - load / balance.units.force)
@@ -154,7 +155,9 @@ def rotation_vector(rotation: Array) -> Array:
     return vector
 
 
-def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, balance: Balance) -> Array:
+def _wanted(
+    simulation: SimulationModel, data: Any, plan: Reference, step: int, balance: Balance, footing: Array
+) -> Array:
     """Return Δl̇ [N] and Δḣω [N m] about the CoM, (6,).
 
     Args:
@@ -163,9 +166,10 @@ def _wanted(simulation: SimulationModel, data: Any, plan: Reference, step: int, 
         plan: with rows.
         step: row of the plan.
         balance: gains, and what else is known of the robot.
+        footing: by how much the feet stand beside the plan [m], (3,).
     """
     gains, rate = balance.gains, balance.units.frequency
-    away, slow = plan.com[step] - data.subtree_com[1], plan.com_velocity[step] - data.subtree_linvel[1]
+    away, slow = plan.com[step] + footing - data.subtree_com[1], plan.com_velocity[step] - data.subtree_linvel[1]
     linear = simulation.robot.mass * (gains.com_stiffness * rate**2 * away + gains.com_damping * rate * slow)
     turn = rotation_vector(plan.rotation[step] @ data.xmat[1].reshape(3, 3).T)
     spin = plan.angular_momentum[step] - data.subtree_angmom[1]

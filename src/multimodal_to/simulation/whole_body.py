@@ -33,7 +33,7 @@ from multimodal_to.scenarios.data import stored
 from multimodal_to.simulation.controller import Belief, Command, Servos, row_of, servo
 from multimodal_to.simulation.feet import PlannedFeet
 from multimodal_to.simulation.known import Known
-from multimodal_to.simulation.look_ahead import Feedback, LookAhead
+from multimodal_to.simulation.look_ahead import Advice, Feedback, LookAhead
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference, reference
 from multimodal_to.simulation.stabiliser import rotation_vector, skew
@@ -166,9 +166,9 @@ class WholeBodyController:
         first, self._robot, self._since = self._robot is None, robot, since
         self._units, self._belief = robot.units, Belief.of(robot, plan, None if first else self._belief)
         self._plan = reference(robot, plan, np.arange(0.0, plan.duration + 2 * PERIOD, PERIOD))
-        self._feet = PlannedFeet.along(self._belief, self._plan, PERIOD)
         self._known = Known.of(robot, plan)
         self._feedback = Feedback(self._belief, self._plan, PERIOD, self._gains.look_ahead, self._known)
+        self._feet = self._feedback.feet
         scenario = stored(plan)
         surface = FlatGround() if scenario is None else scenario.surface
         self._ground = frame_function(surface).map(len(robot.contacts)) if robot.contacts else None
@@ -202,7 +202,7 @@ class WholeBodyController:
         plan, step = self._plan, row_of(time - self._since, PERIOD, self._plan)
         advice = self._feedback.advise(state, step)
         self._shift = self._shift + (advice.joints - self._shift) * PERIOD / JOINT_LAG
-        self._torques = self._solve(state, step, time, advice.errors)
+        self._torques = self._solve(state, step, time, advice)
         servos = Servos(
             positions=plan.joints[step] + self._shift,
             velocities=plan.joint_velocities[step],
@@ -213,21 +213,21 @@ class WholeBodyController:
             torques=self._torques, throttle=around(self._robot.jets, plan, step, advice.throttle), servos=servos
         )
 
-    def _solve(self, state: State, step: int, time: float, errors: Array) -> Array:
+    def _solve(self, state: State, step: int, time: float, advice: Advice) -> Array:
         """Return the torques of the joints [N m or N], (n,).
 
         Args:
             state: as it was measured.
             step: row of the plan.
             time: since the simulation's start [s].
-            errors: of the momentum and what follows from it.
+            advice: what the feedback along the plan sees.
         """
         mass, bias = self._belief.mass_matrix(), self._belief.of_joints.T @ self._belief.data.qfrc_bias
-        feet, contacts = self._feet_and_contacts(step, time)
+        feet, contacts = self._feet_and_contacts(step, time, advice.footing)
         stands = bool(contacts.points)
         tasks = [
             *feet,
-            *self._momentum(mass, bias, step, errors),
+            *self._momentum(mass, bias, step, advice.errors),
             self._attitude(step, stands),
             self._posture(state, step, stands),
         ]
@@ -246,8 +246,14 @@ class WholeBodyController:
         """Return J_Tᵀ T, (6 + n,)."""
         return np.asarray(self._belief.of_thrusts(state.thrust) @ self._belief.of_joints)
 
-    def _feet_and_contacts(self, step: int, time: float) -> tuple[list[_Task], _Contacts]:
-        """Return the tasks of the feet and which points may push."""
+    def _feet_and_contacts(self, step: int, time: float, footing: Array) -> tuple[list[_Task], _Contacts]:
+        """Return the tasks of the feet and which points may push.
+
+        Args:
+            step: row of the plan.
+            time: since the simulation's start [s].
+            footing: by how much the plan is followed beside itself [m], (3,).
+        """
         simulation, data, feet, units = self._belief.simulation, self._belief.data, self._feet, self._units
         standing, swinging = list[_Task](), list[tuple[Array, Array, bool]]()
         points, jacobians, cones = list[int](), list[Array](), list[Array]()
@@ -273,7 +279,7 @@ class WholeBodyController:
                     jacobians.append(jacobian[:3] - arm @ jacobian[3:])
                     cones.append(self._cone(normals[:, point], tangents[:, 2 * point : 2 * point + 2]))
             else:
-                error = np.concatenate([feet.middle[foot, step] - positions[own].mean(axis=0), turn])
+                error = np.concatenate([feet.middle[foot, step] + footing - positions[own].mean(axis=0), turn])
                 swinging.append((jacobian, self._swing(foot, step, error, speed, late=bool(loaded)) - drift, soon))
         weights = self._weights
         for jacobian, wanted, soon in swinging:
