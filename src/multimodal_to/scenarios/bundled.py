@@ -156,7 +156,7 @@ def jump() -> Scenario:
             joint_velocities={"upper_body": 2e4, "legs": 2e4},  # 1e4 in the paper
             joint_accelerations=1.5e2,
             posture=2e1,
-            contact_force_rates=1e-1,
+            contact_force_rates=1.0,  # 1e-1 in the paper; forces that change fast leave a controller no room
             contact_forces=1.0,
             base_orientation=2e7,
             skimming=4e7,
@@ -231,7 +231,13 @@ def paper(name: str) -> Scenario:
             interval_max=0.05,
             mid_height_min=0.75,
             sliding_max=None,
-            weights=replace(plain.weights, angular_momentum=1e2, base_orientation=1e6, final_posture=1e7),
+            weights=replace(
+                plain.weights,
+                angular_momentum=1e2,
+                contact_force_rates=1e-1,
+                base_orientation=1e6,
+                final_posture=1e7,
+            ),
         )
     return plain
 
