@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import signal
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from multimodal_to.arguments import checked
-from multimodal_to.errors import InputError
+from multimodal_to.errors import InputError, OutputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.simulation.controller import Controller, drawn
 from multimodal_to.simulation.disturbance import GAIN_SPREAD, Disturbance, draw
@@ -81,10 +85,13 @@ class Draws:
     seed: int = 1
     push: float | None = None  # force of the push [N]; 0.114 of the weight by default
     noise: bool = False  # sensors with noise and an estimate that drifts
+    push_starts: tuple[float, float] | None = None  # from when to when a push starts [s]; by default at any time
 
     def __post_init__(self) -> None:
         if self.seed < 0 or not (self.push is None or 0.0 <= self.push < np.inf):
             raise InputError(f"the draws are {self}; expected a seed and a push of at least zero")
+        if self.push_starts is not None and not -np.inf < self.push_starts[0] <= self.push_starts[1] < np.inf:
+            raise InputError(f"the draws are {self}; expected push_starts as two finite numbers that do not fall")
 
 
 @checked
@@ -110,7 +117,8 @@ def run_trial(
     draws, rng, disturbance = draws or Draws(), None, None
     if number is not None:
         rng = np.random.default_rng([draws.seed, number])
-        disturbance = draw(robot, plan.duration, rng, push=draws.push, noise=draws.noise)
+        starts = draws.push_starts
+        disturbance = draw(robot, plan.duration, rng, push=draws.push, noise=draws.noise, push_starts=starts)
     controller = make(rng)
     playback = play(robot, plan, controller, disturbance=disturbance, torque_limits=torque_limits)
     return playback, _trial(playback, number or 0, disturbance)
@@ -153,19 +161,40 @@ def run_trials(
         make: the controller; a function that other processes can import if there are several.
         torque_limits: clip the torque of each joint's motor at its effort limit.
         jobs: how many run at once, each in a process of its own.
+
+    Raises:
+        OutputError: a process of the trials was ended from outside, as where memory is short.
     """
     if jobs <= 1 or len(numbers) <= 1:
         for number in numbers:
             yield run_trial(robot, plan, number, draws, make=make, torque_limits=torque_limits)[1]
         return
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(max_workers=min(jobs, len(numbers)), mp_context=context) as pool:
+    with ProcessPoolExecutor(min(jobs, len(numbers)), context, initializer=_end_with_the_parent) as pool:
         waiting = [pool.submit(_alone, robot, plan, number, draws, make, torque_limits) for number in numbers]
         try:
             for done in as_completed(waiting):
                 yield done.result()
+        except BrokenProcessPool as error:
+            raise OutputError(
+                "a process of the trials was ended from outside, perhaps because memory is short; expected room for "
+                f"{min(jobs, len(numbers))} at once"
+            ) from error
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _end_with_the_parent() -> None:
+    """Let this process end at once by Ctrl-C, and when its parent has ended, however that did."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # without a word: the parent speaks
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 @checked
