@@ -36,7 +36,10 @@ from multimodal_to.trajectory.derived import flight_phases
 from pages import put
 from tasks import JETS, urdf_of
 
-BEFORE, AFTER = 1.0, 0.2  # from when to when a late push starts, about the moment at which the robot leaves the ground [s]
+BEFORE, AFTER = (
+    1.0,
+    0.2,
+)  # from when to when a late push starts, about the moment at which the robot leaves the ground [s]
 
 
 def plan_of(asked: str, scratch: Path) -> tuple[str, mt.Robot, Trajectory]:
@@ -116,9 +119,7 @@ def row(
     alone = run_trial(robot, plan, None, make=make)[1]
     kinds = {"undisturbed": [alone], "disturbed": drawn(options.trials, draws)}
     if options.gains:
-        kinds["gains"] = [
-            gains_alone(robot, plan, number, options.seed, make=make) for number in range(options.gains)
-        ]
+        kinds["gains"] = [gains_alone(robot, plan, number, options.seed, make=make) for number in range(options.gains)]
     if options.noise:
         kinds["noise"] = drawn(options.noise, replace(draws, noise=True))
     if options.late:

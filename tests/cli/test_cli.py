@@ -423,9 +423,9 @@ def test_trials_of_other_seeds_are_kept_apart_and_those_of_another_plan_are_forg
         draw={"friction": 1.1},
     )
     higher = replace(plan, base_position=plan.base_position + 0.1)
-    first, second, other = (
-        _Log.of(tmp_path / "trials.json", ironcub, of, {"seed": seed}) for of, seed in ((plan, 1), (plan, 2), (higher, 1))
-    )
+    log = tmp_path / "trials.json"
+    first, second = (_Log.of(log, ironcub, plan, {"seed": seed}) for seed in (1, 2))
+    other = _Log.of(log, ironcub, higher, {"seed": 1})
     first.add(replace(trial, number=3))
     second.add(trial)
     first.add(trial)
@@ -434,7 +434,7 @@ def test_trials_of_other_seeds_are_kept_apart_and_those_of_another_plan_are_forg
     assert other.trials() == {}
     other.add(trial)
     assert first.trials() == {}
-    (tmp_path / "trials.json").write_text('{"runs": [{"settings": ')
+    log.write_text('{"runs": [{"settings": ')
     assert other.trials() == {}
 
 

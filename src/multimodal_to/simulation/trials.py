@@ -6,11 +6,12 @@ import multiprocessing
 import os
 import signal
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
-from typing import Any
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import Any, cast
 
 import numpy as np
 
@@ -169,32 +170,90 @@ def run_trials(
         for number in numbers:
             yield run_trial(robot, plan, number, draws, make=make, torque_limits=torque_limits)[1]
         return
+    started = [_start(robot, plan, draws, make, torque_limits) for _ in range(min(jobs, len(numbers)))]
+    waiting, busy = deque(numbers), set[Connection]()
+    try:
+        for pipe, _ in started:
+            pipe.send(waiting.popleft())
+            busy.add(pipe)
+        while busy:
+            for pipe in cast(list[Connection], wait(list(busy))):
+                done = pipe.recv()
+                if waiting:
+                    pipe.send(waiting.popleft())
+                else:
+                    busy.remove(pipe)
+                if isinstance(done, Exception):
+                    raise done
+                yield done
+    except (EOFError, BrokenPipeError, ConnectionResetError) as error:
+        raise OutputError(
+            f"a process of the trials was ended from outside, as where memory is short; {len(started)} ran at once"
+        ) from error
+    finally:
+        for pipe, process in started:
+            process.terminate()
+            process.join()
+            pipe.close()
+
+
+def _start(
+    robot: Robot, plan: Trajectory, draws: Draws | None, make: Make, torque_limits: bool
+) -> tuple[Connection, BaseProcess]:
+    """Start a process that runs the trials whose numbers it is sent, and return the pipe to it.
+
+    It does not hear Ctrl-C, from its first import on: its parent does, and it ends with that.
+
+    Args:
+        robot: that moves.
+        plan: its motion.
+        draws: how trials are drawn.
+        make: the controller.
+        torque_limits: clip the torque of each joint's motor at its effort limit.
+    """
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(jobs, len(numbers)), context, initializer=_end_with_the_parent) as pool:
-        waiting = [pool.submit(_alone, robot, plan, number, draws, make, torque_limits) for number in numbers]
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_work, args=(theirs, robot, plan, draws, make, torque_limits), daemon=True)
+    heard = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is threading.main_thread() and heard is not None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # which the process keeps
         try:
-            for done in as_completed(waiting):
-                yield done.result()
-        except BrokenProcessPool as error:
-            raise OutputError(
-                "a process of the trials was ended from outside, perhaps because memory is short; expected room for "
-                f"{min(jobs, len(numbers))} at once"
-            ) from error
+            process.start()
         finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+            signal.signal(signal.SIGINT, heard)
+    else:
+        process.start()
+    theirs.close()
+    return ours, process
+
+
+def _work(
+    pipe: Connection, robot: Robot, plan: Trajectory, draws: Draws | None, make: Make, torque_limits: bool
+) -> None:
+    """Run trials until the parent has ended, however that did; send what came of each, or the error.
+
+    Args:
+        pipe: from which their numbers come.
+        robot: that moves.
+        plan: its motion.
+        draws: how trials are drawn.
+        make: the controller.
+        torque_limits: clip the torque of each joint's motor at its effort limit.
+    """
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+    while True:
+        number = pipe.recv()
+        try:
+            pipe.send(run_trial(robot, plan, number, draws, make=make, torque_limits=torque_limits)[1])
+        except Exception as error:  # the parent raises it
+            pipe.send(error)
 
 
 def _end_with_the_parent() -> None:
-    """Let this process end at once by Ctrl-C, and when its parent has ended, however that did."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # without a word: the parent speaks
     parent = multiprocessing.parent_process()
     assert parent is not None
-
-    def watch() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
+    parent.join()
+    os._exit(1)
 
 
 @checked
@@ -210,7 +269,3 @@ def gains_alone(robot: Robot, plan: Trajectory, number: int, seed: int, *, make:
     """
     playback = play(robot, plan, make(np.random.default_rng([seed, number])))
     return _trial(playback, number, None)
-
-
-def _alone(robot: Robot, plan: Trajectory, number: int, draws: Draws | None, make: Make, torque_limits: bool) -> Trial:
-    return run_trial(robot, plan, number, draws, make=make, torque_limits=torque_limits)[1]

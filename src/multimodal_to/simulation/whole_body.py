@@ -138,9 +138,9 @@ class _Ground:
         self.normals = np.zeros((count, 3))  # n
         self.tangents = np.zeros((count, 2, 3))  # t
         self._buffer, self._evaluate = frame_function(surface).map(count).buffer()
-        self._buffer.set_arg(0, memoryview(self._points))
+        self._buffer.set_arg(0, self._points.data)
         for index, array in enumerate((self.heights, self.normals, self.tangents)):
-            self._buffer.set_res(index, memoryview(array))
+            self._buffer.set_res(index, array.data)
 
     def look(self, points: Array) -> None:
         """Find what lies below points in the world [m], (points, 3)."""
