@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+import time
+from contextlib import suppress
 from dataclasses import asdict, fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import multimodal_to as mt
+from commands import run
 from drones import HOP, drone
 from multimodal_to.errors import InputError
 from multimodal_to.scenarios.data import to_json
@@ -320,3 +327,44 @@ def test_the_feedback_asks_nothing_of_a_jet_from_when_it_has_failed(tmp_path):
     left, right = advice(feedback, belief, plan, after, place=aside).throttle
     assert left == 0.0
     assert right != 0.0
+
+
+def children_of(process):
+    """The processes that a process has started and that run, and those that they have, by Linux's tables."""
+    found = []
+    for table in Path("/proc", str(process), "task").glob("*/children"):
+        with suppress(OSError):
+            for child in map(int, table.read_text().split()):
+                found += [child, *children_of(child)]
+    return found
+
+
+def runs(process):
+    with suppress(OSError):
+        return Path("/proc", str(process), "stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at the tables of Linux")
+def test_killed_trials_leave_no_process_and_go_on_where_they_stopped(tmp_path):
+    robot = drone(tmp_path)
+    file = part_of(hovering(robot), 0.0, 0.1).save(tmp_path / "plan.npz")
+    asked = [sys.executable, "-m", "multimodal_to", "simulate", file, "--robot", tmp_path, "--trials", "1000"]
+    process = subprocess.Popen(asked, stdout=subprocess.PIPE, text=True)
+    with process.stdout as said:
+        before, first = said.readline(), said.readline()
+        children = children_of(process.pid)
+        process.kill()
+    process.wait()
+    assert before.startswith("1000 to do, 2 at once")
+    assert first.startswith("trial ")
+    assert len(children) >= 2
+    for _ in range(200):
+        if not any(map(runs, children)):
+            break
+        time.sleep(0.05)
+    assert not any(map(runs, children))
+    kept = len(json.loads((tmp_path / "plan-trials.json").read_text())["runs"][0]["trials"])
+    again = run("simulate", file, "--robot", tmp_path, "--trials", kept)
+    assert f"{kept} of {kept} trials are in" in again.stdout
+    assert "trial   " not in again.stdout
