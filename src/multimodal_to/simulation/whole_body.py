@@ -304,7 +304,7 @@ class WholeBodyController:
             jacobian, moving, turn = self._motion(foot, step, middle, body)
             speed, drift = moving
             if close and (loaded or (soon and feet.velocity[foot, step, 2] < DOWN * units.length * units.frequency)):
-                standing.append(self._standing(jacobian, speed, drift, turn))
+                standing.append(self._standing(jacobian, speed, drift, turn, sole=len(own) > 2))
                 points.extend(own.tolist())
                 of_points = jacobian[:3] - _skews(positions[own] - middle) @ jacobian[3:]
                 jacobians.append(of_points.reshape(3 * len(own), -1))
@@ -339,19 +339,23 @@ class WholeBodyController:
         """Return a weight of linear and turning accelerations, (6,), from that in the robot's own units."""
         return weight * np.repeat([self._units.gravity**-2, self._units.frequency**-4], 3)
 
-    def _standing(self, jacobian: Array, speed: Array, drift: Array, turn: Array) -> _Task:
-        """Return the task of a foot that stands: it comes to rest, level where the plan has it so.
+    def _standing(self, jacobian: Array, speed: Array, drift: Array, turn: Array, *, sole: bool) -> _Task:
+        """Return the task of a foot that stands: it comes to rest; a sole is level where the plan has it so.
 
         Args:
             jacobian: of the foot.
             speed: its velocity [m/s, rad/s], (6,).
             drift: J̇ ν, (6,).
             turn: how far it is turned from the plan [rad], (3,).
+            sole: it has three points or more; a foot of fewer may turn on the ground.
         """
         rate = self._gains.stance_rate * self._units.frequency
         wanted = -rate * speed
         wanted[3:5] += 0.25 * rate**2 * turn[:2]
-        return _Task(matrix=jacobian, wanted=wanted - drift, weight=self._weight(self._weights.stance))
+        rows = slice(6 if sole else 3)
+        return _Task(
+            matrix=jacobian[rows], wanted=(wanted - drift)[rows], weight=self._weight(self._weights.stance)[rows]
+        )
 
     def _swing(self, foot: int, step: int, error: Array, speed: Array, *, late: bool) -> Array:
         """Return the acceleration of a foot in the air [m/s², rad/s²], (6,).
