@@ -117,7 +117,9 @@ def row(
         return sorted(found, key=lambda trial: trial.number)
 
     alone = run_trial(robot, plan, None, make=make)[1]
-    kinds = {"undisturbed": [alone], "disturbed": drawn(options.trials, draws)}
+    kinds = {"undisturbed": [alone]}
+    if options.trials:
+        kinds["disturbed"] = drawn(options.trials, draws)
     if options.gains:
         kinds["gains"] = [gains_alone(robot, plan, number, options.seed, make=make) for number in range(options.gains)]
     if options.noise:
@@ -125,16 +127,15 @@ def row(
     if options.late:
         leaves = flight_phases(robot, plan)[0][0] - float(plan.time[0])
         kinds["late"] = drawn(options.late, replace(draws, push_starts=(leaves - BEFORE, leaves + AFTER)))
-    times = [trial.control_time for trial in [alone, *kinds["disturbed"]]]
+    times = [trial.control_time for trials in kinds.values() for trial in trials]
     cells = [
         f"{100 * alone.com_error_max:.1f} cm",
         f"{np.degrees(alone.base_error_max):.1f}°",
         f"{alone.torque_ratio_max:.2f}",
         f"{alone.touch_down_speed_max:.2f} m/s",
         ended(alone),
-        survivors(kinds["disturbed"]),
         f"{1e3 * np.mean(times):.2f} ms",
-        *(survivors(kinds[kind]) for kind in ("gains", "noise", "late") if kind in kinds),
+        *(survivors(trials) for kind, trials in kinds.items() if kind != "undisturbed"),
     ]
     return cells, kinds
 
@@ -154,10 +155,14 @@ def main() -> None:
     parser.add_argument("--into", type=Path, metavar="PAGE", help="also set the table between the marks of a page")
     options = parser.parse_args()
     make, console = CONTROLLERS[options.controller], Console(highlight=False, soft_wrap=True, markup=False)
-    titles = ["plan", "CoM", "base", "torque / effort", "touch-down", "end", f"{options.trials} trials", "command"]
-    titles += [f"{options.gains} with other gains"] if options.gains else []
-    titles += [f"{options.noise} with noise"] if options.noise else []
-    titles += [f"{options.late} pushed late"] if options.late else []
+    titles = ["plan", "CoM", "base", "torque / effort", "touch-down", "end", "command"]
+    more = {
+        "trials": options.trials,
+        "with other gains": options.gains,
+        "with noise": options.noise,
+        "pushed late": options.late,
+    }
+    titles += [f"{count} {kind}" for kind, count in more.items() if count]
     lines = [f"| {' | '.join(titles)} |", f"|{' -- |' * len(titles)}"]
     console.print("\n".join(lines))
     with tempfile.TemporaryDirectory() as scratch:
