@@ -109,6 +109,9 @@ def row(
         plan: its motion.
         options: of the command line.
         make: the controller.
+
+    Raises:
+        SystemExit: late pushes are asked of a robot that never leaves the ground.
     """
     draws = Draws(seed=options.seed)
 
@@ -125,7 +128,9 @@ def row(
     if options.noise:
         kinds["noise"] = drawn(options.noise, replace(draws, noise=True))
     if options.late:
-        leaves = flight_phases(robot, plan)[0][0] - float(plan.time[0])
+        if not (flights := flight_phases(robot, plan)):
+            raise SystemExit(f"'{plan.scenario}' never leaves the ground; expected a plan that does with --late")
+        leaves = flights[0][0] - float(plan.time[0])
         kinds["late"] = drawn(options.late, replace(draws, push_starts=(leaves - BEFORE, leaves + AFTER)))
     times = [trial.control_time for trials in kinds.values() for trial in trials]
     cells = [
@@ -134,8 +139,9 @@ def row(
         f"{alone.torque_ratio_max:.2f}",
         f"{alone.touch_down_speed_max:.2f} m/s",
         ended(alone),
+        *([survivors(kinds["disturbed"])] if options.trials else []),
         f"{1e3 * np.mean(times):.2f} ms",
-        *(survivors(trials) for kind, trials in kinds.items() if kind != "undisturbed"),
+        *(survivors(kinds[kind]) for kind in ("gains", "noise", "late") if kind in kinds),
     ]
     return cells, kinds
 
@@ -155,14 +161,12 @@ def main() -> None:
     parser.add_argument("--into", type=Path, metavar="PAGE", help="also set the table between the marks of a page")
     options = parser.parse_args()
     make, console = CONTROLLERS[options.controller], Console(highlight=False, soft_wrap=True, markup=False)
-    titles = ["plan", "CoM", "base", "torque / effort", "touch-down", "end", "command"]
-    more = {
-        "trials": options.trials,
-        "with other gains": options.gains,
-        "with noise": options.noise,
-        "pushed late": options.late,
-    }
-    titles += [f"{count} {kind}" for kind, count in more.items() if count]
+    titles = ["plan", "CoM", "base", "torque / effort", "touch-down", "end"]
+    titles += [f"{options.trials} trials"] if options.trials else []
+    titles += ["command"]
+    titles += [f"{options.gains} with other gains"] if options.gains else []
+    titles += [f"{options.noise} with noise"] if options.noise else []
+    titles += [f"{options.late} pushed late"] if options.late else []
     lines = [f"| {' | '.join(titles)} |", f"|{' -- |' * len(titles)}"]
     console.print("\n".join(lines))
     with tempfile.TemporaryDirectory() as scratch:
