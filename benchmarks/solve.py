@@ -6,7 +6,8 @@
 A scenario is the name of a bundled one or a TOML file. A run solves it as the command line does without pictures, in a
 process of its own, and then from Python: built, solved from its plain start guess, and solved again from that answer
 for a target that is 2 cm higher: the height at mid-horizon where the scenario asks for one, otherwise that of the end.
-A `Planner` then plans for the two targets in turn: the last of its re-plans has settled. How an iteration's time is split is that of the last phase, the exact one.
+A `Planner` then plans for the two targets in turn: the last of its re-plans has settled. How an iteration's time is
+split is that of the last phase, the exact one.
 
 * `--executable` takes the default problem, of plans that the robot carries out, in place of the paper's.
 * `--without-native` measures everything once more without the native library: CasADi's functions and MUMPS.

@@ -64,6 +64,11 @@ URDFS: Mapping[str, str] = {
 JETS: Mapping[str, tuple[str, ...]] = {"iris": ROTORS}
 
 
+def urdf_of(name: str) -> Path:
+    """Return the URDF of a robot of `URDFS`."""
+    return _example(URDFS[name]) if URDFS[name] else _icub()
+
+
 @dataclass(frozen=True, kw_only=True)
 class Row:
     """What came of a robot and a task."""
@@ -119,8 +124,7 @@ def all_of(name: str, tasks: Sequence[str], keep: Path) -> tuple[list[Row], dict
     """
     rows, reasons = list[Row](), dict[str, list[str]]()
     try:
-        urdf = _example(URDFS[name]) if URDFS[name] else _icub()
-        robot = mt.robots.init(urdf, keep / name, jets=JETS.get(name, ())).robot
+        robot = mt.robots.init(urdf_of(name), keep / name, jets=JETS.get(name, ())).robot
     except mt.MultimodalError as error:
         return rows, {f"`robot init`: {error}": list(tasks)}
     for task in tasks:

@@ -18,8 +18,10 @@ from commands import run, run_process
 from multimodal_to import scenario_files, scenarios
 from multimodal_to.cli.expectation import TYPICAL_ITERATIONS
 from multimodal_to.cli.showing import _labels
+from multimodal_to.cli.simulating import _fingerprint, _Log, _worst
 from multimodal_to.models.terrain import Plane
 from multimodal_to.scenarios.data import stored, to_json
+from multimodal_to.simulation import Trial
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.derived import largest_torques
 from synthetic import take_off as synthetic_take_off
@@ -398,10 +400,66 @@ def test_a_simulation_as_json_has_a_list_of_trials(file, tmp_path):
     result = run("simulate", file, "--json", "--output", tmp_path / "one.npz")
     found = json.loads(result.stdout)
     assert found["seed"] is None
+    assert found["controller"] == "servos"
     assert [trial["draw"] for trial in found["trials"]] == [None]
     assert {"survived", "com_error_max", "base_error_max", "torque_ratio_max", "touch_down_speed_max"} < set(
         found["trials"][0]
     )
+
+
+def test_trials_of_other_seeds_are_kept_apart_and_those_of_another_plan_are_forgotten(ironcub, file, tmp_path):
+    pytest.importorskip("mujoco")
+    plan = Trajectory.load(file)
+    trial = Trial(
+        number=0,
+        survived=False,
+        end="fell",
+        fell=1.0,
+        com_error_max=0.1,
+        base_error_max=0.2,
+        torque_ratio_max=0.3,
+        touch_down_speed_max=0.4,
+        control_time=1e-3,
+        draw={"friction": 1.1},
+    )
+    higher = replace(plan, base_position=plan.base_position + 0.1)
+    log = tmp_path / "trials.json"
+    first, second = (_Log.of(log, ironcub, plan, {"seed": seed}) for seed in (1, 2))
+    other = _Log.of(log, ironcub, higher, {"seed": 1})
+    first.add(replace(trial, number=3))
+    second.add(trial)
+    first.add(trial)
+    assert first.trials() == {0: trial, 3: replace(trial, number=3)}
+    assert second.trials() == {0: trial}
+    assert other.trials() == {}
+    other.add(trial)
+    assert first.trials() == {}
+    log.write_text('{"runs": [{"settings": ')
+    assert other.trials() == {}
+
+
+def test_trials_of_a_robot_that_was_changed_are_others(ironcub, file):
+    plan = Trajectory.load(file)
+    efforts = replace(ironcub.joint_limits, effort=0.9 * ironcub.joint_limits.effort)
+    weaker = replace(ironcub, joint_limits=efforts)
+    assert _fingerprint(ironcub, plan) == _fingerprint(ironcub, plan)
+    assert _fingerprint(weaker, plan) != _fingerprint(ironcub, plan)
+
+
+def test_the_worst_trial_fell_first_or_else_left_the_plan_farthest():
+    def trial(number, fell, error, *, survived=False):
+        return SimpleNamespace(number=number, survived=survived, fell=fell, com_error_max=error)
+
+    steady = [trial(0, None, 0.1, survived=True), trial(1, None, 0.2, survived=True)]
+    assert _worst(steady).number == 1
+    assert _worst([*steady, trial(2, None, 0.3)]).number == 2
+    assert _worst([*steady, trial(2, None, 0.3), trial(3, 2.0, 0.1), trial(4, 1.0, 0.1)]).number == 4
+
+
+def test_an_unknown_controller_is_refused_with_those_that_exist(file, tmp_path):
+    result = run("simulate", file, "--controller", "servo", "--output", tmp_path / "none.npz")
+    assert result.returncode == 2
+    assert "unknown controller 'servo'; did you mean 'servos'? Available: servos, whole-body" in result.stderr
 
 
 def test_trials_that_were_done_are_not_done_again(file, tmp_path):

@@ -110,6 +110,14 @@ class Stage:
         return pose
 
 
+def test_a_fall_is_marked_when_it_was_and_one_after_the_end_at_the_end(trajectory):
+    plan = replace(trajectory, time=trajectory.time + 3.0)
+    assert replay.mark_of_fall(plan, None) == {}
+    assert replay.mark_of_fall(plan, 0.5) == {3.5: "it fell"}
+    late = replay.mark_of_fall(plan, plan.duration + 0.4)
+    assert late == {3.0 + plan.duration: "it fell 0.4 s after the end"}
+
+
 def test_another_motion_is_drawn_with_the_first_in_step_and_faint(robot, trajectory, tmp_path):
     later = replace(trajectory, time=2.0 * trajectory.time + 3.0, base_position=trajectory.base_position + 0.1)
     path = replay.write_html(robot, trajectory, tmp_path / "both.html", ghost=later, meshes=False)

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+import time
+from contextlib import suppress
 from dataclasses import asdict, fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -331,3 +337,53 @@ def test_the_feedback_asks_nothing_of_a_jet_from_when_it_has_failed(tmp_path):
     left, right = advice(feedback, belief, plan, after, place=aside).throttle
     assert left == 0.0
     assert right != 0.0
+
+
+def children_of(process):
+    """The processes that a process has started and that run, and those that they have, by Linux's tables."""
+    found = []
+    for table in Path("/proc", str(process), "task").glob("*/children"):
+        with suppress(OSError):
+            for child in map(int, table.read_text().split()):
+                found += [child, *children_of(child)]
+    return found
+
+
+def runs(process):
+    with suppress(OSError):
+        return Path("/proc", str(process), "stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at the tables of Linux")
+def test_killed_trials_leave_no_process_and_a_file_of_those_that_were_done(tmp_path):
+    robot = drone(tmp_path)
+    file = part_of(hovering(robot), 0.0, 0.1).save(tmp_path / "plan.npz")
+    asked = [sys.executable, "-m", "multimodal_to", "simulate", file, "--robot", tmp_path, "--trials", "1000"]
+    process = subprocess.Popen(asked, stdout=subprocess.PIPE, text=True)
+    with process.stdout as said:
+        before, first = said.readline(), said.readline()
+        children = children_of(process.pid)
+        process.kill()
+    process.wait()
+    assert before.startswith("1000 to do, 2 at once")
+    assert first.startswith("trial ")
+    assert len(children) >= 2
+    for _ in range(200):
+        if not any(map(runs, children)):
+            break
+        time.sleep(0.05)
+    assert not any(map(runs, children))
+    kept = json.loads((tmp_path / "plan-trials.json").read_text())["runs"][0]["trials"]
+    assert int(first.split()[1].rstrip(":")) in [trial["number"] for trial in kept]
+
+
+def test_a_quadratic_program_bends_legs_that_stand_on_points():
+    """A shank turns about the point that it stands on, as it cannot on a sole."""
+    pytest.importorskip("piqp")
+    robot = mt.load_robot("solo12")
+    problem = mt.build(robot, mt.tasks.squat(robot))
+    outcome = tracking(play(problem.robot, mt.solve(problem).trajectory, WholeBodyController()))
+    assert outcome.survived
+    assert outcome.com < 0.01 * robot.standing_height
+    assert outcome.joint < 1.0

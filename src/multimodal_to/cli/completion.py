@@ -19,6 +19,13 @@ def scenarios(incomplete: str) -> list[str]:
     return _starting(SCENARIOS, incomplete)
 
 
+def controllers(incomplete: str) -> list[str]:
+    """Return the controllers of `simulate` that start so."""
+    from multimodal_to.simulation.trials import CONTROLLERS
+
+    return _starting(CONTROLLERS, incomplete)
+
+
 def tasks(incomplete: str) -> list[str]:
     """Return the bundled scenarios and the starter tasks that start so."""
     return _starting(dict.fromkeys((*SCENARIOS, *TASKS)), incomplete)

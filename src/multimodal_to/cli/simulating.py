@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,14 +25,17 @@ from multimodal_to.cli.common import (
     writable,
     writable_file,
 )
+from multimodal_to.cli.completion import controllers
 from multimodal_to.cli.streams import print_json
-from multimodal_to.errors import InputError, OutputError
+from multimodal_to.errors import InputError, OutputError, unknown
 from multimodal_to.files.writing import write_text
 from multimodal_to.models.robot import Robot
-from multimodal_to.trajectory import Trajectory
+from multimodal_to.trajectory import QUANTITIES, Trajectory
+from multimodal_to.trajectory.conditions import to_json
 
 if TYPE_CHECKING:
     from multimodal_to.simulation import Draws, Playback, Tracking, Trial
+    from multimodal_to.simulation.trials import Make
 
 
 @app.command()
@@ -39,6 +44,9 @@ def simulate(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Simulated trajectory to write. [FILE-simulated.npz]")
     ] = None,
+    controller: Annotated[
+        str, typer.Option(metavar="NAME", help="servos or whole-body.", autocompletion=controllers)
+    ] = "servos",
     trials: Annotated[
         int | None,
         typer.Option(parser=whole_number_option, metavar="COUNT", help="Play it back so often, each time disturbed."),
@@ -74,29 +82,37 @@ def simulate(
     _refuse(target, trials, jobs)
     the_robot, plan = loaded(file, robot)
     from multimodal_to.simulation import Draws, run_trial, simulated_trajectory
+    from multimodal_to.simulation.trials import CONTROLLERS
 
+    if controller not in CONTROLLERS:
+        raise InputError(unknown("controller", controller, CONTROLLERS))
+    make = CONTROLLERS[controller]
     writable(target.parent)
     if film is not None:
         writable_file(film, ".html")
     draws = Draws(seed=seed, push=push, noise=noise)
     if trials is None:
-        playback, trial = run_trial(the_robot, plan, None, torque_limits=torque_limits)
+        playback, trial = run_trial(the_robot, plan, None, make=make, torque_limits=torque_limits)
         done = [trial]
         if not as_json:
             _say_playback(the_robot, plan, playback)
     else:
-        notes = target.with_name(f"{file.stem}-trials.json")
-        done = _trials(the_robot, plan, draws, trials, jobs=jobs, torque_limits=torque_limits, log=notes, quiet=as_json)
-        worst = max(done, key=lambda trial: (not trial.survived, -(trial.fell or 0.0), trial.com_error_max))
-        playback, _ = run_trial(the_robot, plan, worst.number, draws, torque_limits=torque_limits)
+        settings = asdict(draws) | {"controller": controller, "torque_limits": torque_limits}
+        log = _Log.of(target.with_name(f"{file.stem}-trials.json"), the_robot, plan, settings)
+        done = _trials(the_robot, plan, draws, trials, make=make, jobs=jobs, log=log, quiet=as_json)
+        worst = _worst(done)
         if not as_json:
             _say_trials(done, worst)
+        playback, _ = run_trial(the_robot, plan, worst.number, draws, make=make, torque_limits=torque_limits)
     simulated = simulated_trajectory(playback)
     wrote = [simulated.save(target)]
     if film is not None:
-        wrote.append(_film(the_robot, plan, simulated, playback.fell, film))
+        from multimodal_to.replay import mark_of_fall, write_html
+
+        marks = mark_of_fall(plan, playback.fell)
+        wrote.append(write_html(the_robot, simulated, film, ghost=plan, marks=marks))
     if as_json:
-        print_json(_as_data(plan, draws, done, disturbed=trials is not None))
+        print_json(_as_data(plan, draws, done, controller=controller, disturbed=trials is not None))
     else:
         for path in wrote:
             out.print(f"wrote {path}", soft_wrap=True)
@@ -111,57 +127,121 @@ def _refuse(target: Path, trials: int | None, jobs: int) -> None:
             raise InputError(f"{name} is {value}; expected at least one")
 
 
-def _film(robot: Robot, plan: Trajectory, simulated: Trajectory, fell: float | None, path: Path) -> Path:
-    from multimodal_to.replay import write_html
-
-    marks = {} if fell is None else {float(plan.time[0]) + min(fell, plan.duration): "it fell"}
-    return write_html(robot, simulated, path, ghost=plan, marks=marks)
-
-
-def _as_data(plan: Trajectory, draws: Draws, done: list[Trial], *, disturbed: bool) -> dict[str, Any]:
+def _as_data(
+    plan: Trajectory, draws: Draws, done: Sequence[Trial], *, controller: str, disturbed: bool
+) -> dict[str, Any]:
     return {
         "scenario": plan.scenario,
         "robot": plan.robot,
         "duration": plan.duration,
+        "controller": controller,
         "seed": draws.seed if disturbed else None,
         "survived": sum(trial.survived for trial in done),
         "trials": [asdict(trial) for trial in done],
     }
 
 
-def _trials(
-    robot: Robot, plan: Trajectory, draws: Draws, count: int, *, jobs: int, torque_limits: bool, log: Path, quiet: bool
-) -> list[Trial]:
-    """Run the trials that a file does not hold yet, and keep each there as soon as it is done."""
-    from multimodal_to.simulation import Trial, run_trials
+@dataclass(frozen=True, kw_only=True)
+class _Log:
+    """The file that keeps the trials of a plan; those that are drawn or carried out in another way stand apart."""
 
-    settings = asdict(draws) | {"torque_limits": torque_limits, "plan": _fingerprint(plan)}
-    done = {trial["number"]: trial for trial in _kept(log, settings) if trial["number"] < count}
-    missing = [number for number in range(count) if number not in done]
-    if done and not quiet:
-        out.print(f"{len(done)} of {count} trials are in {log}", soft_wrap=True)
-    for trial in run_trials(robot, plan, missing, draws, torque_limits=torque_limits, jobs=jobs):
-        done[trial.number] = asdict(trial)
-        write_text(log, json.dumps({"settings": settings, "trials": [done[key] for key in sorted(done)]}, indent=1))
-        line = f"trial {trial.number:3d}: {_ended(trial)} ({len(done)} of {count})"
-        say("progress", "dim", line) if quiet else out.print(line, soft_wrap=True)
-    return [Trial(**done[number]) for number in sorted(done)]
+    path: Path
+    settings: Mapping[str, Any]  # of these trials
+
+    @classmethod
+    def of(cls, path: Path, robot: Robot, plan: Trajectory, settings: Mapping[str, Any]) -> _Log:
+        """Return the log of a plan.
+
+        Args:
+            path: of the file.
+            robot: that moves.
+            plan: its motion.
+            settings: how trials are drawn and carried out.
+        """
+        from multimodal_to.simulation.model import mujoco_module
+
+        versions = f"multimodal-to {version('multimodal-to')}, MuJoCo {mujoco_module().__version__}"
+        own = {**settings, "plan": _fingerprint(robot, plan), "versions": versions}
+        return cls(path=path, settings=json.loads(json.dumps(own)))  # as the file has them
+
+    def trials(self) -> dict[int, Trial]:
+        """Return the trials of these settings by their numbers."""
+        return {trial.number: trial for run in self._runs() for trial in run["trials"] if self._is_own(run)}
+
+    def add(self, trial: Trial) -> None:
+        """Keep a trial; the file is read again, since another command may have written to it."""
+        runs, own = [run for run in self._runs() if not self._is_own(run)], self.trials() | {trial.number: trial}
+        runs.append({"settings": self.settings, "trials": [own[number] for number in sorted(own)]})
+        plain = [run | {"trials": [asdict(one) for one in run["trials"]]} for run in runs]
+        write_text(self.path, json.dumps({"runs": plain}, indent=1))
+
+    def _is_own(self, run: Mapping[str, Any]) -> bool:
+        return bool(run["settings"] == self.settings)
+
+    def _runs(self) -> list[dict[str, Any]]:
+        """Return what the file holds of this plan; nothing where it is none of these, and nothing of other plans."""
+        from multimodal_to.simulation import Trial
+
+        try:
+            runs = json.loads(self.path.read_text(encoding="utf-8"))["runs"]
+            return [
+                {"settings": run["settings"], "trials": [Trial(**trial) for trial in run["trials"]]}
+                for run in runs
+                if run["settings"]["plan"] == self.settings["plan"]
+                and run["settings"]["versions"] == self.settings["versions"]
+            ]
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+            return []
 
 
-def _kept(log: Path, settings: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the trials of a file, if they are of the same plan and settings."""
-    try:
-        kept = json.loads(log.read_text(encoding="utf-8"))
-        return list(kept["trials"]) if kept["settings"] == settings else []
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return []
-
-
-def _fingerprint(plan: Trajectory) -> str:
+def _fingerprint(robot: Robot, plan: Trajectory) -> str:
+    """Return what tells a plan from others: of its motion, its task, and the robot as its files have it now."""
+    stated = to_json(robot), repr((robot.contacts, robot.home, robot.added_frames)), plan.rule, plan.scenario_json
+    parts = [robot.urdf.read_bytes(), *(text.encode() for text in stated)]
+    parts += [array.tobytes() for array in (plan.time, *(getattr(plan, name) for name in QUANTITIES))]
     digest = hashlib.sha256()
-    for part in (plan.time, plan.base_position, plan.joint_positions, plan.contact_forces, plan.thrust):
-        digest.update(part.tobytes())
+    for part in parts:
+        digest.update(len(part).to_bytes(8) + part)
     return digest.hexdigest()[:16]
+
+
+def _trials(
+    robot: Robot,
+    plan: Trajectory,
+    draws: Draws,
+    count: int,
+    *,
+    make: Make,
+    jobs: int,
+    log: _Log,
+    quiet: bool,
+) -> list[Trial]:
+    """Run the trials that a log does not hold yet, and keep each there as soon as it is done."""
+    from multimodal_to.simulation import run_trials
+
+    def tell(line: str) -> None:
+        say("progress", "dim", line) if quiet else out.print(line, soft_wrap=True)
+
+    done = {number: trial for number, trial in log.trials().items() if number < count}
+    missing = [number for number in range(count) if number not in done]
+    if done:
+        tell(f"{len(done)} of {count} trials are in {log.path}")
+    if missing:
+        tell(f"{len(missing)} to do, {min(jobs, len(missing))} at once; each is kept in {log.path} when it is done")
+    limited = bool(log.settings["torque_limits"])
+    for trial in run_trials(robot, plan, missing, draws, make=make, torque_limits=limited, jobs=jobs):
+        done[trial.number] = trial
+        log.add(trial)
+        tell(f"trial {trial.number:3d}: {_ended(trial)} ({len(done)} of {count})")
+    return [done[number] for number in sorted(done)]
+
+
+def _worst(done: Sequence[Trial]) -> Trial:
+    """Return the trial that fell first; where none fell one that did not survive, else that of the largest error."""
+    return min(
+        done,
+        key=lambda trial: (trial.survived, math.inf if trial.fell is None else trial.fell, -trial.com_error_max),
+    )
 
 
 def _ended(trial: Trial) -> str:
@@ -171,7 +251,7 @@ def _ended(trial: Trial) -> str:
     return f"{trial.end}, CoM {100 * trial.com_error_max:.1f} cm, base {math.degrees(trial.base_error_max):.1f}°"
 
 
-def _say_trials(done: list[Trial], worst: Trial) -> None:
+def _say_trials(done: Sequence[Trial], worst: Trial) -> None:
     good = [trial for trial in done if trial.survived]
     out.print(f"{len(good)} of {len(done)} trials survive", soft_wrap=True)
     if good:

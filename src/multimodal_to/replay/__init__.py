@@ -8,12 +8,13 @@ linearly and the links stay together.
 from multimodal_to.replay.embedding import Embedded, show
 from multimodal_to.replay.live import serve
 from multimodal_to.replay.meshes import MeshWarning
-from multimodal_to.replay.page import packed, player, write_html, write_still_html
+from multimodal_to.replay.page import mark_of_fall, packed, player, write_html, write_still_html
 from multimodal_to.replay.pictures import snapshot_times, write_gif, write_mp4, write_snapshots
 
 __all__ = [
     "Embedded",
     "MeshWarning",
+    "mark_of_fall",
     "packed",
     "player",
     "serve",

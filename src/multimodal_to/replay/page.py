@@ -67,6 +67,23 @@ def write_html(
 
 
 @checked
+def mark_of_fall(plan: Trajectory, fell: float | None) -> dict[float, str]:
+    """Return the mark of a fall for a page that plays what happened to a plan; none where the robot did not fall.
+
+    A fall after the end of the plan is marked at its end.
+
+    Args:
+        plan: that was carried out.
+        fell: when, since the plan's start [s].
+    """
+    if fell is None:
+        return {}
+    late = fell - plan.duration
+    text = "it fell" + (f" {late:.1f} s after the end" if late > 0.05 else "")
+    return {float(plan.time[0]) + min(fell, plan.duration): text}
+
+
+@checked
 def page(
     robot: Robot,
     trajectory: Trajectory,

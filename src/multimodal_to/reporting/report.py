@@ -21,7 +21,7 @@ from multimodal_to.auditing.findings import Finding
 from multimodal_to.files.writing import write_text
 from multimodal_to.models.robot import Robot
 from multimodal_to.plotting import FIGURES, plot, plot_margins
-from multimodal_to.replay import packed, player
+from multimodal_to.replay import mark_of_fall, packed, player
 from multimodal_to.scenarios.files import to_toml
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import Trajectory
@@ -92,7 +92,7 @@ def write_report(
                 robot,
                 carried.motion,
                 ghost=trajectory,
-                marks={} if carried.fell is None else {trajectory.time[0] + carried.fell: "it fell"},
+                marks=mark_of_fall(trajectory, carried.fell),
                 meshes=meshes,
             ),
             figures="\n".join(_figure(name, robot, trajectory, report) for name in FIGURES),

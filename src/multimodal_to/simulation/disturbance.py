@@ -90,11 +90,17 @@ class Disturbance:
 
 @checked
 def draw(
-    robot: Robot, duration: float, rng: np.random.Generator, *, push: float | None = None, noise: bool = False
+    robot: Robot,
+    duration: float,
+    rng: np.random.Generator,
+    *,
+    push: float | None = None,
+    noise: bool = False,
+    push_starts: tuple[float, float] | None = None,
 ) -> Disturbance:
     """Return a disturbance at random: masses ±5 %, motor gains and friction ±20 %, a delay of 2 to 10 ms, a push.
 
-    The push is level, in any direction, for 0.2 s that end before the plan does.
+    The push is level, in any direction, for 0.2 s that by default end before the plan does.
 
     Args:
         robot: that is disturbed.
@@ -102,13 +108,14 @@ def draw(
         rng: that draws.
         push: its force [N]; 0.114 of the weight by default.
         noise: let the controller see sensors with noise and an estimate that drifts.
+        push_starts: from when to when the push starts [s]; by default at any time of the plan.
     """
     links, _ = read_urdf(robot.urdf)
     masses = {link.name: float(rng.uniform(1 - MASS_SPREAD, 1 + MASS_SPREAD)) for link in links if link.mass > 0.0}
     gains = {name: float(rng.uniform(1 - GAIN_SPREAD, 1 + GAIN_SPREAD)) for name in robot.joint_names}
     friction = float(rng.uniform(1 - FRICTION_SPREAD, 1 + FRICTION_SPREAD))
     delay = float(rng.uniform(*DELAY))
-    start = float(rng.uniform(0.0, max(duration - PUSH_TIME, 0.0)))
+    start = float(rng.uniform(*(push_starts or (0.0, max(duration - PUSH_TIME, 0.0)))))
     angle = float(rng.uniform(-np.pi, np.pi))
     strength = PUSH * robot.units.force if push is None else push
     force = (strength * float(np.cos(angle)), strength * float(np.sin(angle)), 0.0)

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import signal
+import threading
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
-from typing import Any
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import Any, cast
 
 import numpy as np
 
 from multimodal_to.arguments import checked
-from multimodal_to.errors import InputError
+from multimodal_to.errors import InputError, OutputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.simulation.controller import Controller, drawn
 from multimodal_to.simulation.disturbance import GAIN_SPREAD, Disturbance, draw
@@ -81,10 +86,13 @@ class Draws:
     seed: int = 1
     push: float | None = None  # force of the push [N]; 0.114 of the weight by default
     noise: bool = False  # sensors with noise and an estimate that drifts
+    push_starts: tuple[float, float] | None = None  # from when to when a push starts [s]; by default at any time
 
     def __post_init__(self) -> None:
         if self.seed < 0 or not (self.push is None or 0.0 <= self.push < np.inf):
             raise InputError(f"the draws are {self}; expected a seed and a push of at least zero")
+        if self.push_starts is not None and not -np.inf < self.push_starts[0] <= self.push_starts[1] < np.inf:
+            raise InputError(f"the draws are {self}; expected push_starts as two finite numbers that do not fall")
 
 
 @checked
@@ -110,7 +118,8 @@ def run_trial(
     draws, rng, disturbance = draws or Draws(), None, None
     if number is not None:
         rng = np.random.default_rng([draws.seed, number])
-        disturbance = draw(robot, plan.duration, rng, push=draws.push, noise=draws.noise)
+        starts = draws.push_starts
+        disturbance = draw(robot, plan.duration, rng, push=draws.push, noise=draws.noise, push_starts=starts)
     controller = make(rng)
     playback = play(robot, plan, controller, disturbance=disturbance, torque_limits=torque_limits)
     return playback, _trial(playback, number or 0, disturbance)
@@ -153,19 +162,98 @@ def run_trials(
         make: the controller; a function that other processes can import if there are several.
         torque_limits: clip the torque of each joint's motor at its effort limit.
         jobs: how many run at once, each in a process of its own.
+
+    Raises:
+        OutputError: a process of the trials was ended from outside, as where memory is short.
     """
     if jobs <= 1 or len(numbers) <= 1:
         for number in numbers:
             yield run_trial(robot, plan, number, draws, make=make, torque_limits=torque_limits)[1]
         return
+    started = [_start(robot, plan, draws, make, torque_limits) for _ in range(min(jobs, len(numbers)))]
+    waiting, busy = deque(numbers), set[Connection]()
+    try:
+        for pipe, _ in started:
+            pipe.send(waiting.popleft())
+            busy.add(pipe)
+        while busy:
+            for pipe in cast(list[Connection], wait(list(busy))):
+                done = pipe.recv()
+                if waiting:
+                    pipe.send(waiting.popleft())
+                else:
+                    busy.remove(pipe)
+                if isinstance(done, Exception):
+                    raise done
+                yield done
+    except (EOFError, BrokenPipeError, ConnectionResetError) as error:
+        raise OutputError(
+            f"a process of the trials was ended from outside, as where memory is short; {len(started)} ran at once"
+        ) from error
+    finally:
+        for pipe, process in started:
+            process.terminate()
+            process.join()
+            pipe.close()
+
+
+def _start(
+    robot: Robot, plan: Trajectory, draws: Draws | None, make: Make, torque_limits: bool
+) -> tuple[Connection, BaseProcess]:
+    """Start a process that runs the trials whose numbers it is sent, and return the pipe to it.
+
+    It does not hear Ctrl-C, from its first import on: its parent does, and it ends with that.
+
+    Args:
+        robot: that moves.
+        plan: its motion.
+        draws: how trials are drawn.
+        make: the controller.
+        torque_limits: clip the torque of each joint's motor at its effort limit.
+    """
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(max_workers=min(jobs, len(numbers)), mp_context=context) as pool:
-        waiting = [pool.submit(_alone, robot, plan, number, draws, make, torque_limits) for number in numbers]
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_work, args=(theirs, robot, plan, draws, make, torque_limits), daemon=True)
+    heard = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is threading.main_thread() and heard is not None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # which the process keeps
         try:
-            for done in as_completed(waiting):
-                yield done.result()
+            process.start()
         finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+            signal.signal(signal.SIGINT, heard)
+    else:
+        process.start()
+    theirs.close()
+    return ours, process
+
+
+def _work(
+    pipe: Connection, robot: Robot, plan: Trajectory, draws: Draws | None, make: Make, torque_limits: bool
+) -> None:
+    """Run trials until the parent has ended, however that did; send what came of each, or the error.
+
+    Args:
+        pipe: from which their numbers come.
+        robot: that moves.
+        plan: its motion.
+        draws: how trials are drawn.
+        make: the controller.
+        torque_limits: clip the torque of each joint's motor at its effort limit.
+    """
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+    while True:
+        number = pipe.recv()
+        try:
+            pipe.send(run_trial(robot, plan, number, draws, make=make, torque_limits=torque_limits)[1])
+        except Exception as error:  # the parent raises it
+            pipe.send(error)
+
+
+def _end_with_the_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 @checked
@@ -181,7 +269,3 @@ def gains_alone(robot: Robot, plan: Trajectory, number: int, seed: int, *, make:
     """
     playback = play(robot, plan, make(np.random.default_rng([seed, number])))
     return _trial(playback, number, None)
-
-
-def _alone(robot: Robot, plan: Trajectory, number: int, draws: Draws | None, make: Make, torque_limits: bool) -> Trial:
-    return run_trial(robot, plan, number, draws, make=make, torque_limits=torque_limits)[1]

@@ -18,7 +18,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from types import ModuleType
 
-import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,7 +26,7 @@ from multimodal_to.arguments import checked
 from multimodal_to.errors import OutputError
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
-from multimodal_to.models.terrain import FlatGround, frame_function
+from multimodal_to.models.terrain import FlatGround, Surface, frame_function
 from multimodal_to.models.units import Sized, Units
 from multimodal_to.scenarios.data import stored
 from multimodal_to.simulation.controller import Belief, Command, Servos, row_of, servo
@@ -48,6 +47,8 @@ SOON = Sized(0.25, "s")  # how long before it is loaded a foot that is near coun
 LOADED = 0.01  # a foot with more planned load than this stands [m g]
 DOWN = 0.0126  # how fast a foot goes on down that should stand already [√(g L)]
 SIDES = 8  # of the pyramid within a friction cone
+FAN = np.stack([trig(2.0 * np.pi * (np.arange(SIDES) + 0.5) / SIDES) for trig in (np.cos, np.sin)], axis=1)
+"""Where the sides of the pyramid point, along the two tangents of the ground, (sides, 2)."""
 FRICTION_SHARE = 0.97  # of the friction coefficient that is used [1]
 ACCURACY, ITERATIONS = 1e-5, 60  # of the program's solution, in the robot's own units [1]
 JOINT_LAG = 0.03  # with which joints take over the wish of the look-ahead [s]
@@ -123,6 +124,30 @@ class _Contacts:
     cones: Array  # rows of what is at most zero, (rows, 3 points)
 
 
+class _Ground:
+    """d, n and t of the ground at the contact points, through buffers: to convert arrays would take most of the time.
+
+    Args:
+        surface: of the ground.
+        count: of the contact points.
+    """
+
+    def __init__(self, surface: Surface, count: int) -> None:
+        self._points = np.zeros((count, 3))
+        self.heights = np.zeros(count)  # d [m]
+        self.normals = np.zeros((count, 3))  # n
+        self.tangents = np.zeros((count, 2, 3))  # t
+        self._buffer, self._evaluate = frame_function(surface).map(count).buffer()
+        self._buffer.set_arg(0, self._points.data)
+        for index, array in enumerate((self.heights, self.normals, self.tangents)):
+            self._buffer.set_res(index, array.data)
+
+    def look(self, points: Array) -> None:
+        """Find what lies below points in the world [m], (points, 3)."""
+        self._points[:] = points
+        self._evaluate()
+
+
 class WholeBodyController:
     """A quadratic program for accelerations and contact forces, on top of soft joint servos.
 
@@ -142,7 +167,10 @@ class WholeBodyController:
         self._feedback: Feedback
         self._known: Known
         self._units: Units
-        self._ground: cs.Function | None
+        self._ground: _Ground | None
+        self._slope: float
+        self._loaded: NDArray[np.bool_]
+        self._soon: NDArray[np.bool_]
         self._legs: NDArray[np.bool_]
         self._servo: tuple[Array, Array]
         self._shift: Array
@@ -171,13 +199,23 @@ class WholeBodyController:
         self._feet = self._feedback.feet
         scenario = stored(plan)
         surface = FlatGround() if scenario is None else scenario.surface
-        self._ground = frame_function(surface).map(len(robot.contacts)) if robot.contacts else None
+        self._ground = _Ground(surface, len(robot.contacts)) if robot.contacts else None
+        self._slope = FRICTION_SHARE * self._belief.friction * np.cos(np.pi / SIDES)
+        self._loaded, self._soon = self._when_loaded()
         self._legs = self._joints_of_feet()
         count, units = len(robot.joint_names), self._units
         self._servo = servo(units, count, self._gains.stiffness, self._gains.damping)
         if first:
             self._shift, self._torques = np.zeros(count), np.zeros(count)
             self._near = np.full(len(robot.feet), -np.inf)  # when each foot was near the ground last [s]
+
+    def _when_loaded(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return when the plan loads each foot, and when it does soon, (feet, steps) each."""
+        loaded = self._feet.load > LOADED * self._units.force
+        steps = np.arange(loaded.shape[1])
+        before = np.cumsum(np.pad(loaded, ((0, 0), (1, 0))), axis=1)
+        ends = np.minimum(steps + round(SOON.of(self._units) / PERIOD) + 1, steps.size)
+        return loaded, before[:, ends] > before[:, steps]
 
     def _joints_of_feet(self) -> NDArray[np.bool_]:
         """Return which joints are between the base and a foot, (n,)."""
@@ -260,27 +298,26 @@ class WholeBodyController:
         if self._ground is None:
             return [], self._contacts(points, jacobians, cones)
         positions = data.geom_xpos[simulation.points]
-        heights, normals, tangents = (np.array(part) for part in self._ground(positions.T))
-        until = min(step + round(SOON.of(units) / PERIOD), feet.load.shape[1] - 1)
+        ground = self._ground
+        ground.look(positions)
         for foot, (own, body) in enumerate(zip(feet.members, feet.bodies, strict=True)):
-            loaded = feet.load[foot, step] > LOADED * units.force
-            soon = bool((feet.load[foot, step : until + 1] > LOADED * units.force).any())
-            lowest = float(heights[0, own].min())
+            loaded, soon = bool(self._loaded[foot, step]), bool(self._soon[foot, step])
+            lowest = float(ground.heights[own].min())
             if lowest < 0.2 * NEAR * units.length:
                 self._near[foot] = time
             close = lowest < NEAR * units.length or time - self._near[foot] < STUCK.of(units)
-            jacobian, moving, turn = self._motion(foot, step, positions[own].mean(axis=0), body)
+            middle = positions[own].mean(axis=0)
+            jacobian, moving, turn = self._motion(foot, step, middle, body)
             speed, drift = moving
             if close and (loaded or (soon and feet.velocity[foot, step, 2] < DOWN * units.length * units.frequency)):
-                standing.append(self._standing(jacobian, speed, drift, turn))
-                for point in own:
-                    arm = skew(positions[point] - positions[own].mean(axis=0))
-                    points.append(int(point))
-                    jacobians.append(jacobian[:3] - arm @ jacobian[3:])
-                    cones.append(self._cone(normals[:, point], tangents[:, 2 * point : 2 * point + 2]))
+                standing.append(self._standing(jacobian, speed, drift, turn, sole=len(own) > 2))
+                points.extend(own.tolist())
+                of_points = jacobian[:3] - _skews(positions[own] - middle) @ jacobian[3:]
+                jacobians.append(of_points.reshape(3 * len(own), -1))
+                cones.append(FAN @ ground.tangents[own] - self._slope * ground.normals[own, None])
             else:
-                error = np.concatenate([feet.middle[foot, step] + footing - positions[own].mean(axis=0), turn])
-                swinging.append((jacobian, self._swing(foot, step, error, speed, late=bool(loaded)) - drift, soon))
+                error = np.concatenate([feet.middle[foot, step] + footing - middle, turn])
+                swinging.append((jacobian, self._swing(foot, step, error, speed, late=loaded) - drift, soon))
         weights = self._weights
         for jacobian, wanted, soon in swinging:
             weight = weights.foot if points else weights.foot_soon * soon
@@ -308,19 +345,23 @@ class WholeBodyController:
         """Return a weight of linear and turning accelerations, (6,), from that in the robot's own units."""
         return weight * np.repeat([self._units.gravity**-2, self._units.frequency**-4], 3)
 
-    def _standing(self, jacobian: Array, speed: Array, drift: Array, turn: Array) -> _Task:
-        """Return the task of a foot that stands: it comes to rest, level where the plan has it so.
+    def _standing(self, jacobian: Array, speed: Array, drift: Array, turn: Array, *, sole: bool) -> _Task:
+        """Return the task of a foot that stands: it comes to rest; a sole is level where the plan has it so.
 
         Args:
             jacobian: of the foot.
             speed: its velocity [m/s, rad/s], (6,).
             drift: J̇ ν, (6,).
             turn: how far it is turned from the plan [rad], (3,).
+            sole: it has three points or more; a foot of fewer may turn on the ground.
         """
         rate = self._gains.stance_rate * self._units.frequency
         wanted = -rate * speed
         wanted[3:5] += 0.25 * rate**2 * turn[:2]
-        return _Task(matrix=jacobian, wanted=wanted - drift, weight=self._weight(self._weights.stance))
+        rows = slice(6 if sole else 3)
+        return _Task(
+            matrix=jacobian[rows], wanted=(wanted - drift)[rows], weight=self._weight(self._weights.stance)[rows]
+        )
 
     def _swing(self, foot: int, step: int, error: Array, speed: Array, *, late: bool) -> Array:
         """Return the acceleration of a foot in the air [m/s², rad/s²], (6,).
@@ -340,20 +381,23 @@ class WholeBodyController:
             wanted[2] = damping * (-DOWN * units.length * units.frequency - speed[2])
         return np.asarray(wanted)
 
-    def _cone(self, normal: Array, tangents: Array) -> Array:
-        """Return the rows of a pyramid within the friction cone: C f ≤ 0, (sides, 3)."""
-        friction = FRICTION_SHARE * self._belief.friction * np.cos(np.pi / SIDES)
-        angles = 2.0 * np.pi * (np.arange(SIDES) + 0.5) / SIDES
-        return np.asarray(
-            np.outer(np.cos(angles), tangents[:, 0]) + np.outer(np.sin(angles), tangents[:, 1]) - friction * normal
-        )
-
     def _contacts(self, points: list[int], jacobians: list[Array], cones: list[Array]) -> _Contacts:
-        rows = np.zeros((SIDES * len(points), 3 * len(points)))
-        for index, cone in enumerate(cones):
-            rows[SIDES * index : SIDES * (index + 1), 3 * index : 3 * (index + 1)] = cone
-        columns = self._belief.of_joints.shape[1]
-        return _Contacts(points=points, jacobian=np.vstack([np.zeros((0, columns)), *jacobians]), cones=rows)
+        """Return the points that may push.
+
+        Args:
+            points: their numbers.
+            jacobians: of the points of each foot, (3 points, 6 + n) each.
+            cones: rows C of C f ≤ 0 of the points of each foot, (points, sides, 3) each.
+        """
+        count, columns = len(points), self._belief.of_joints.shape[1]
+        rows = np.zeros((count, SIDES, count, 3))
+        if count:
+            rows[range(count), :, range(count)] = np.concatenate(cones)
+        return _Contacts(
+            points=points,
+            jacobian=np.concatenate([np.zeros((0, columns)), *jacobians]),
+            cones=rows.reshape(SIDES * count, 3 * count),
+        )
 
     def _momentum(self, mass: Array, bias: Array, step: int, errors: Array) -> tuple[_Task, _Task]:
         """Return the tasks of the momentum's rates.
@@ -424,27 +468,27 @@ class WholeBodyController:
             step: row of the plan.
         """
         units, size = self._units, len(mass)
-        matrix, weight = np.vstack([task.matrix for task in tasks]), np.concatenate([task.weight for task in tasks])
-        wanted, count = np.concatenate([task.wanted for task in tasks]), 3 * len(contacts.points)
+        count, pairs = 3 * len(contacts.points), len(contacts.cones)
         scale = np.repeat([units.gravity, units.frequency**2, units.force], [3, size - 3, count])
-        torques = np.hstack([mass[6:], -contacts.jacobian.T[6:]]) * scale / units.moment
-        offset, limits = bias[6:] / units.moment, self._limits() / units.moment
+        matrix = np.concatenate([task.matrix for task in tasks]) * scale[:size]
+        weighted = np.concatenate([task.weight for task in tasks])[:, None] * matrix
+        wanted = np.concatenate([task.wanted for task in tasks])
+        equations = np.hstack([mass, -contacts.jacobian.T]) * scale
+        torques, offset, limits = equations[6:] / units.moment, bias[6:] / units.moment, self._limits() / units.moment
         hessian = self._weights.torque * torques.T @ torques
         gradient = self._weights.torque * offset @ torques
-        weighted = weight[:, None] * matrix * scale[:size]
-        hessian[:size, :size] += (matrix * scale[:size]).T @ weighted
+        hessian[:size, :size] += matrix.T @ weighted
         gradient[:size] -= wanted @ weighted
         of_force = self._weights.force
-        hessian[range(len(scale)), range(len(scale))] += np.repeat([1e-6, of_force], [size, count])
+        hessian[range(size + count), range(size + count)] += np.repeat([1e-6, of_force], [size, count])
         gradient[size:] -= of_force * self._plan.contact_forces[step][contacts.points].ravel() / units.force
         share = np.repeat([units.force, units.moment], 3)
-        base = np.hstack([mass[:6], -contacts.jacobian.T[:6]]) * scale / share[:, None]
         limited = np.isfinite(limits)
-        rows = np.zeros((len(contacts.cones) + int(limited.sum()), len(scale)))
-        rows[: len(contacts.cones), size:], rows[len(contacts.cones) :] = contacts.cones, torques[limited]
-        lower = np.concatenate([np.full(len(contacts.cones), -np.inf), (-limits - offset)[limited]])
-        upper = np.concatenate([np.zeros(len(contacts.cones)), (limits - offset)[limited]])
-        found = _quadratic(hessian, gradient, base, -bias[:6] / share, rows, lower, upper)
+        rows = np.zeros((pairs + int(limited.sum()), size + count))
+        rows[:pairs, size:], rows[pairs:] = contacts.cones, torques[limited]
+        lower = np.concatenate([np.full(pairs, -np.inf), (-limits - offset)[limited]])
+        upper = np.concatenate([np.zeros(pairs), (limits - offset)[limited]])
+        found = _quadratic(hessian, gradient, equations[:6] / share[:, None], -bias[:6] / share, rows, lower, upper)
         if found is None:  # no forces hold it; the servos do what they can
             return np.asarray(np.clip(self._torques, -self._limits(), self._limits()))
         return np.asarray(np.clip((torques @ found + offset) * units.moment, -self._limits(), self._limits()))
@@ -452,6 +496,12 @@ class WholeBodyController:
     def _limits(self) -> Array:
         assert self._robot is not None
         return np.asarray(self._robot.joint_limits.effort)
+
+
+def _skews(vectors: Array) -> Array:
+    """Return `skew` of each of some vectors, (vectors, 3, 3)."""
+    (x, y, z), zero = vectors.T, np.zeros(len(vectors))
+    return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
 
 
 def _quadratic(
