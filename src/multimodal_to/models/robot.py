@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -206,16 +205,6 @@ class Robot(Value):
             x, y, z = (float(one) for one in self.com_at(self.home))
             return x, y, z
         return 0.0, 0.0, -float(contacts[:, 2].min())
-
-    @property
-    def speed_unit(self) -> float:
-        """Return √(|g| L) [m/s], the robot's own unit of speed."""
-        return math.sqrt(float(np.linalg.norm(self.gravity)) * self.standing_height)
-
-    @property
-    def rate_unit(self) -> float:
-        """Return √(|g| / L) [1/s], the robot's own unit of rates; a pendulum of its height has this frequency."""
-        return math.sqrt(float(np.linalg.norm(self.gravity)) / self.standing_height)
 
     @property
     def capsules(self) -> tuple[Capsule, ...]:

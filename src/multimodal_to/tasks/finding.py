@@ -13,7 +13,7 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.bundled import SCENARIOS
 from multimodal_to.scenarios.bundled import find as bundled
 from multimodal_to.scenarios.data import HEIGHTS, RECORDS
-from multimodal_to.scenarios.files import change, parted
+from multimodal_to.scenarios.files import changed, parted
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.tasks import in_air, on_feet
 from multimodal_to.values import FrozenMapping
@@ -62,19 +62,33 @@ def find(name: str, robot: Robot, settings: Iterable[str] = ()) -> Scenario:
     Raises:
         ScenarioError: there is none of that name, the robot cannot do it, or a change is wrong.
     """
+    return asked(name, robot, dict(map(parted, settings)))
+
+
+@checked
+def asked(name: str, robot: Robot, values: Mapping[str, Any]) -> Scenario:
+    """Return what `find` does, with changes by dotted keys, as `{"height": 0.1, "weights.thrust": 3.0}`.
+
+    Args:
+        name: of the task.
+        robot: that does it.
+        values: by key, as a file has them.
+
+    Raises:
+        ScenarioError: there is none of that name, the robot cannot do it, or a change is wrong.
+    """
     if not is_starter(name, robot.name):
         refuse_unknown(name)
-        return change(bundled(name), settings)
-    hints, said, rest = numbers(name), dict[str, Any](), list[str]()
-    for setting in settings:
-        key, value = parted(setting)
+        return changed(bundled(name), values)
+    hints, said, rest = numbers(name), dict[str, Any](), dict[str, Any]()
+    for key, value in values.items():
         if key in hints:
             said[key] = RECORDS.value(hints[key], value, key)
         elif key.partition(".")[0] in (known := [*hints, *(entry.name for entry in fields(Scenario)), *HEIGHTS]):
-            rest.append(setting)
+            rest[key] = value
         else:
             raise ScenarioError(unknown("key", key, known))
-    return change(TASKS[name](robot, **said), rest)
+    return changed(TASKS[name](robot, **said), rest)
 
 
 def refuse_unknown(name: str) -> None:
