@@ -213,7 +213,9 @@ class Robot(Value):
 
     @cached_property
     def _apart_at_home(self) -> dict[CapsulePair, float]:
-        pairs = capsule_pairs.apart_at_home(self.kindyn, self.home.joint_positions, self.capsules, self.standing_height)
+        pairs = capsule_pairs.apart_at_home(
+            self.kindyn, self.home.joint_positions, self.capsules, self.standing_height, self.held_pairs
+        )
         return {pair: away for pair, away in pairs.items() if frozenset(c.name for c in pair) not in self.ignored_pairs}
 
     @cached_property
@@ -229,7 +231,7 @@ class Robot(Value):
         L at home, and can meet within the ranges of the joints.
 
         Raises:
-            ModelError: two capsules of `held_pairs` are neighbours, or touch at home, or are ignored.
+            ModelError: two capsules of `held_pairs` are neighbours, or overlap at home, or are ignored.
         """
         if self.held_pairs:
             return self._stated_pairs()
@@ -244,7 +246,7 @@ class Robot(Value):
             if names <= present and names not in by_names:
                 raise ModelError(
                     f"the capsules {listed(sorted(names))} cannot be held apart: they are neighbours in the tree, or "
-                    "touch at home, or are ignored"
+                    "overlap at home, or are ignored"
                 )
         return tuple(pair for names, pair in by_names.items() if names in self.held_pairs)
 
