@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import multiprocessing
 import re
 import tempfile
@@ -108,7 +109,7 @@ def vary(robot_name: str, name: str, index: int, seed: int) -> tuple[Robot, Scen
         task, size = _starter(robot, name, height)
         return robot, replace(task, friction=friction), f"{size}, friction {friction:.2f}, mass {1 + 0.03 * mass:.3f}"
     height, distance = HEIGHT.of(robot.units) * height, DISTANCE.of(robot.units) * distance
-    task, far = _moved(replace(scenarios.find(name), friction=friction), height, distance)
+    task, far = _moved(replace(mt.tasks.find(name, robot), friction=friction), height, distance)
     return robot, task, f"height {height:+.3f} m, friction {friction:.2f}, mass {1 + 0.03 * mass:.3f}{far}"
 
 
@@ -147,10 +148,12 @@ def _moved(scenario: Scenario, height: float, distance: float) -> tuple[Scenario
     x, y, z = scenario.end_com
     if isinstance(scenario.surface, Stairs):
         step = replace(scenario.surface, edges=(scenario.surface.edges[0] + 0.5 * distance,))
-        moved = replace(scenario, surface=step, final_com=(x - 0.5 * distance, y, z))
+        moved = replace(scenario, surface=step, final_com=(x + 0.5 * math.copysign(distance, x * distance), y, z))
         return moved, f", distance {0.5 * distance:+.3f} m"
     if x:
-        return replace(scenario, final_com=(x - distance, y, z)), f", distance {distance:+.3f} m"
+        return replace(
+            scenario, final_com=(x + math.copysign(distance, x * distance), y, z)
+        ), f", distance {distance:+.3f} m"
     return scenario, ""
 
 

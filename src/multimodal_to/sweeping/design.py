@@ -23,7 +23,7 @@ from multimodal_to.scenarios.data import from_dict, to_dict
 from multimodal_to.scenarios.files import changed, load
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.sweeping.variants import PREFIX, check_key
-from multimodal_to.tasks.finding import TASKS, asked, is_starter, refuse_unknown
+from multimodal_to.tasks.finding import asked, follows_from, refuse_unknown
 
 MOST_ROWS = 1_000_000
 """The most plans of a sweep."""
@@ -269,7 +269,7 @@ def _texts(value: Any, key: str) -> list[str]:
 
 
 def _scenario(name: str, folder: Path, robots: Sequence[str]) -> Scenario | str:
-    """Return the scenario of a name or a file; the name itself where it is a starter task for one of the robots.
+    """Return the scenario of a name or a file; the name itself where its numbers follow from one of the robots.
 
     Args:
         name: in the sweep's file.
@@ -279,8 +279,7 @@ def _scenario(name: str, folder: Path, robots: Sequence[str]) -> Scenario | str:
     if name.endswith(".toml"):
         return load(folder / name)
     refuse_unknown(name)
-    starter = name in TASKS and any(is_starter(name, load_robot(robot).name) for robot in robots)
-    return name if starter else find(name)
+    return name if any(follows_from(name, load_robot(robot).name) for robot in robots) else find(name)
 
 
 def _robot(name: str, folder: Path) -> str:
