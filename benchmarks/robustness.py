@@ -14,7 +14,8 @@ of these at once, by lengths that are those of the iRonCub and follow the robot'
 - every joint of the posture that the robot stands near by up to ±0.05 rad, within its range.
 
 Each is solved from the plain start guess with default options, and audited. One line each, which `--lines` also appends
-to a file: what stands there is not solved again. Then a table, which `--into` sets between the marks of a page.
+to a file: what stands there is not solved again. Then a table of all draws that the file has of these tasks, which
+`--into` sets between the marks of a page.
 """
 
 from __future__ import annotations
@@ -248,7 +249,7 @@ def main() -> None:
         for name in TASKS[robot]
         if not options.tasks or name in options.tasks
     ]
-    with multiprocessing.get_context("spawn").Pool(options.workers, maxtasksperchild=1) as pool:
+    with multiprocessing.get_context("spawn").Pool(options.workers, maxtasksperchild=10) as pool:
         for outcome in pool.imap_unordered(run, [draw for draw in draws if draw not in there]):
             outcomes.append(outcome)
             if options.lines is not None:
@@ -260,8 +261,8 @@ def main() -> None:
                 f"{outcome.iterations} iterations, {outcome.seconds:.0f} s, {verdict}",
                 soft_wrap=True,
             )
-    wanted = set(draws)
-    mine = [one for one in outcomes if (one.robot, one.scenario, one.index, one.seed) in wanted]
+    named = {(robot, name, options.seed) for robot in options.robot for name in options.tasks or TASKS[robot]}
+    mine = [one for one in outcomes if (one.robot, one.scenario, one.seed) in named]
     text = markdown(sorted(mine, key=lambda one: (options.robot.index(one.robot), tasks_order(one), one.index)))
     print(text)
     if options.into is not None:

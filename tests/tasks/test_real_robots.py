@@ -17,7 +17,7 @@ import multimodal_to as mt
 from hopper import heading
 from multimodal_to.models.attitude import product, tilt
 from multimodal_to.ocp.schedule import Schedule
-from multimodal_to.trajectory.derived import footsteps, joint_torques
+from multimodal_to.trajectory.derived import base_poses, footsteps, joint_torques
 from one_leg import one_leg
 from places import example_robots
 
@@ -43,8 +43,8 @@ def solo():
 
 def greatest_tilt(robot, motion):
     """How far the base leans from home at most [rad]."""
-    home = robot.home.base_quaternion_xyzw
-    return max(tilt(turned, home, robot.up) for turned in motion.base_quaternion_xyzw.T)
+    home = robot.home.base_transform[:3, :3]
+    return max(tilt(pose[:3, :3], home, robot.up) for pose in base_poses(motion))
 
 
 def test_solo_jumps_level_symmetric_in_the_air_and_within_its_motors(solo):
