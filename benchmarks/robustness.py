@@ -3,24 +3,26 @@
     python benchmarks/robustness.py [TASK ...] [--robot ironcub ...] [--variations 10] [--seed 1] [--workers 2]
         [--lines FILE] [--into PAGE]
 
-The iRonCub has the six bundled scenarios, any other robot the starter tasks that it can do. Every variation changes all
+The iRonCubs have the six bundled scenarios, the other robots the starter tasks of `TASKS`. Every variation changes all
 of these at once, by lengths that are those of the iRonCub and follow the robot's L:
 
 - the target's height by up to ±0.05 m (the jump, which is as high as the motors can, by down to −0.05 m) and, where
   there is one, the distance by up to ±0.2 m (the step and the place on it by ±0.1 m); of a starter task its own size,
   the depth, height or distance, by up to ±30 %;
-- the friction within 0.25 to 0.6; of other robots than the iRonCub by up to ±25 %;
+- the friction within 0.25 to 0.6; of other robots than the iRonCubs by up to ±25 %;
 - every mass and inertia by up to ±3 %;
 - every joint of the posture that the robot stands near by up to ±0.05 rad, within its range.
 
 Each is solved from the plain start guess with default options, and audited. One line each, which `--lines` also appends
-to a file: what stands there is not solved again. Then a table, which `--into` sets between the marks of a page.
+to a file: what stands there is not solved again. Then a table of all draws that the file has of these tasks, which
+`--into` sets between the marks of a page.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import multiprocessing
 import re
 import tempfile
@@ -40,18 +42,23 @@ from multimodal_to.models.units import Sized
 from multimodal_to.scenarios.scenario import Scenario
 from pages import put
 
-OWN_SCENARIOS = "ironcub"
-"""The robot whose tasks are the bundled scenarios."""
+SIDE_STEP = "side-step"
+"""A hover to the left."""
+TASKS: Mapping[str, Sequence[str]] = {
+    "ironcub": tuple(scenarios.SCENARIOS),
+    "ironcub-mk3": tuple(scenarios.SCENARIOS),
+    "solo12": ("jump", "walk", "trot"),
+    "talos": ("step", "squat", "jump"),
+    "quadrotor": ("hover", SIDE_STEP),
+}
+"""The tasks of each bundled robot."""
 SIZES: Mapping[str, tuple[str, float]] = {
     "squat": ("depth", 0.2),
-    "jump": ("height", 0.15),
     "step": ("ahead", 0.3),
     "walk": ("distance", 0.8),
     "trot": ("distance", 1.5),
-    "take-off": ("height", 0.5),
-    "land": ("height", 0.5),
 }
-"""The size of a starter task, and about how much of L it is."""
+"""The size of a starter task, and how much of L it is where it is not said."""
 SPREAD = 0.3
 """By how much of itself the size of a starter task varies, either way [1]."""
 HEIGHT, DISTANCE = Sized(0.05, "m"), Sized(0.2, "m")
@@ -88,7 +95,7 @@ def vary(robot_name: str, name: str, index: int, seed: int) -> tuple[Robot, Scen
         index: of the variation.
         seed: of all of them.
     """
-    if robot_name == OWN_SCENARIOS:
+    if robot_name == "ironcub":
         rng = np.random.default_rng([seed, sorted(scenarios.SCENARIOS).index(name), index])
     else:
         rng = np.random.default_rng([seed, *robot_name.encode(), *name.encode(), index])
@@ -98,21 +105,29 @@ def vary(robot_name: str, name: str, index: int, seed: int) -> tuple[Robot, Scen
     limits, home = robot.joint_limits, robot.home
     posture = np.clip(home.joint_positions + turns, limits.lower, limits.upper)
     robot = replace(robot, home=replace(home, joint_positions=posture))
-    if robot_name != OWN_SCENARIOS:
+    if TASKS[robot_name] != tuple(scenarios.SCENARIOS):
         friction = robot.friction * (0.75 + 0.5 * (friction - 0.25) / 0.35)
         task, size = _starter(robot, name, height)
         return robot, replace(task, friction=friction), f"{size}, friction {friction:.2f}, mass {1 + 0.03 * mass:.3f}"
     height, distance = HEIGHT.of(robot.units) * height, DISTANCE.of(robot.units) * distance
-    task, far = _moved(replace(scenarios.find(name), friction=friction), height, distance)
+    task, far = _moved(replace(mt.tasks.find(name, robot), friction=friction), height, distance)
     return robot, task, f"height {height:+.3f} m, friction {friction:.2f}, mass {1 + 0.03 * mass:.3f}{far}"
 
 
 def _starter(robot: Robot, name: str, share: float) -> tuple[Scenario, str]:
     """Return a starter task whose size is changed by a share of `SPREAD`, and the size in words."""
-    if name not in SIZES:
-        return mt.tasks.TASKS[name](robot), "as it is"
-    what, usual = SIZES[name]
-    size = usual * (1.0 + SPREAD * share) * robot.standing_height
+    factor = 1.0 + SPREAD * share
+    if name in ("hover", SIDE_STEP):
+        usual = mt.tasks.hover(robot)
+        begin, end = np.array(usual.initial_com_shift), np.array(usual.final_com_shift)
+        x, y, z = factor * (end - begin)
+        by = (x, y, z) if name == "hover" else (y, x, z)
+        return mt.tasks.hover(robot, by=by), f"by {factor * np.linalg.norm(end - begin):.3f} m"
+    if name == "jump":
+        height = factor * ((mt.tasks.jump(robot).mid_height_min or 0.0) - robot.home_com[2])
+        return mt.tasks.jump(robot, height=height), f"height {height:.3f} m"
+    what, usual_share = SIZES[name]
+    size = usual_share * factor * robot.standing_height
     return mt.tasks.TASKS[name](robot, **{what: size}), f"{what} {size:.3f} m"
 
 
@@ -134,10 +149,12 @@ def _moved(scenario: Scenario, height: float, distance: float) -> tuple[Scenario
     x, y, z = scenario.end_com
     if isinstance(scenario.surface, Stairs):
         step = replace(scenario.surface, edges=(scenario.surface.edges[0] + 0.5 * distance,))
-        moved = replace(scenario, surface=step, final_com=(x - 0.5 * distance, y, z))
+        moved = replace(scenario, surface=step, final_com=(x + 0.5 * math.copysign(distance, x * distance), y, z))
         return moved, f", distance {0.5 * distance:+.3f} m"
     if x:
-        return replace(scenario, final_com=(x - distance, y, z)), f", distance {distance:+.3f} m"
+        return replace(
+            scenario, final_com=(x + math.copysign(distance, x * distance), y, z)
+        ), f", distance {distance:+.3f} m"
     return scenario, ""
 
 
@@ -184,20 +201,6 @@ def run(drawn: tuple[str, str, int, int]) -> Outcome:
     )
 
 
-def tasks_of(robot_name: str) -> list[str]:
-    """Return the names of the tasks of a bundled robot."""
-    if robot_name == OWN_SCENARIOS:
-        return list(scenarios.SCENARIOS)
-    robot, able = mt.load_robot(robot_name), list[str]()
-    for name, task in mt.tasks.TASKS.items():
-        try:
-            task(robot)
-        except mt.MultimodalError:
-            continue
-        able.append(name)
-    return able
-
-
 def known(lines: Path | None) -> list[Outcome]:
     """Return the outcomes that a file of lines has."""
     if lines is None or not lines.exists():
@@ -228,7 +231,7 @@ def main() -> None:
     """Run all variations and print what became of them."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("tasks", nargs="*", help="names of tasks; by default all that each robot has")
-    parser.add_argument("--robot", nargs="+", default=[OWN_SCENARIOS], choices=sorted(bundled_robots()))
+    parser.add_argument("--robot", nargs="+", default=["ironcub"], choices=sorted(TASKS))
     parser.add_argument("--variations", type=int, default=10)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=1)
@@ -243,10 +246,10 @@ def main() -> None:
         (robot, name, index, options.seed)
         for index in range(options.variations)
         for robot in options.robot
-        for name in tasks_of(robot)
+        for name in TASKS[robot]
         if not options.tasks or name in options.tasks
     ]
-    with multiprocessing.get_context("spawn").Pool(options.workers, maxtasksperchild=1) as pool:
+    with multiprocessing.get_context("spawn").Pool(options.workers, maxtasksperchild=10) as pool:
         for outcome in pool.imap_unordered(run, [draw for draw in draws if draw not in there]):
             outcomes.append(outcome)
             if options.lines is not None:
@@ -258,8 +261,8 @@ def main() -> None:
                 f"{outcome.iterations} iterations, {outcome.seconds:.0f} s, {verdict}",
                 soft_wrap=True,
             )
-    wanted = set(draws)
-    mine = [one for one in outcomes if (one.robot, one.scenario, one.index, one.seed) in wanted]
+    named = {(robot, name, options.seed) for robot in options.robot for name in options.tasks or TASKS[robot]}
+    mine = [one for one in outcomes if (one.robot, one.scenario, one.seed) in named]
     text = markdown(sorted(mine, key=lambda one: (options.robot.index(one.robot), tasks_order(one), one.index)))
     print(text)
     if options.into is not None:
@@ -268,7 +271,7 @@ def main() -> None:
 
 def tasks_order(outcome: Outcome) -> int:
     """Return where the task of an outcome stands among those of its robot."""
-    return [*scenarios.SCENARIOS, *mt.tasks.TASKS].index(outcome.scenario)
+    return TASKS[outcome.robot].index(outcome.scenario)
 
 
 if __name__ == "__main__":

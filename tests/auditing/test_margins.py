@@ -149,7 +149,7 @@ def test_without_a_margin_a_centre_of_pressure_may_be_anywhere_in_the_sole(ironc
 
 def coming_down(robot, speed):
     """Return heights that fall as fast as a touch-down speed [m/s] allows, from 0.1 L to the ground."""
-    rate, heights = DESCENT_RATE * robot.rate_unit, [0.1 * robot.standing_height]
+    rate, heights = DESCENT_RATE * robot.units.frequency, [0.1 * robot.standing_height]
     for _ in range(KNOTS):
         heights.append(max((heights[-1] - STEP * speed) / (1.0 + STEP * rate), 0.0))
     return np.array(heights)
@@ -157,7 +157,7 @@ def coming_down(robot, speed):
 
 def test_a_foot_that_slows_down_as_it_comes_down_has_the_speed_of_its_last_bit(ironcub):
     scenario = task(touch_down_speed=0.04)
-    speed = 0.04 * ironcub.speed_unit
+    speed = 0.04 * ironcub.units.of("m/s")
     limit = PROPERTIES["touch-down speed"].limit_for(ironcub, scenario)
     assert limit == pytest.approx(speed, rel=0.01)
     heights = coming_down(ironcub, speed)

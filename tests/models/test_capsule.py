@@ -8,6 +8,7 @@ import casadi as cs
 import numpy as np
 import pytest
 
+import multimodal_to as mt
 from multimodal_to.adam.kinematics import Pose
 from multimodal_to.errors import ModelError
 from multimodal_to.models import capsule_pairs
@@ -258,3 +259,25 @@ def test_the_plumes_are_those_of_the_jets_in_use(ironcub):
     assert bare.capsules == bare.link_capsules == ironcub.link_capsules
     solid = {name for name in names(ironcub.near_capsule_pairs) if "plume" not in name}
     assert names(bare.near_capsule_pairs) == solid
+
+
+def test_a_pair_that_is_stated_is_held_apart_however_near_it_is_at_home(tmp_path):
+    """Postures of a person's own bring Talos's feet nearer than what counts as touching where nothing is stated."""
+    talos = mt.load_robot("talos")
+    names = frozenset({"left foot", "right foot"})
+
+    def feet_apart(robot):
+        return names in {frozenset(one.name for one in pair) for pair in robot.capsule_pairs}
+
+    turned = talos.home.joint_positions.copy()
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        turned[talos.joint_names.index(f"leg_{side}_2_joint")] += 0.04 * sign
+    near = replace(talos, home=replace(talos.home, joint_positions=turned))
+    away = capsule_pairs.distances(
+        near.kindyn, turned[:, None], [pair for pair in talos.capsule_pairs if {one.name for one in pair} == names]
+    )[0, 0]
+    assert 0.0 < away < capsule_pairs.AT_HOME * talos.standing_height
+    assert feet_apart(talos)
+    assert feet_apart(near)
+    assert near.near_capsule_pairs
+    assert not feet_apart(replace(near, held_pairs=frozenset()))

@@ -222,7 +222,7 @@ def test_ranges_that_a_scenario_leaves_open_follow_from_the_robot_and_what_is_as
     assert scenario.com_box(small) == pytest.approx((1.5 * length,) * 3, rel=1e-3)
     leap = replace(scenario, final_com=(2.0, 0.0, 0.57), mid_height_min=1.0)
     assert leap.com_box(ironcub)[0] == pytest.approx(2.0 + 0.5 * ironcub.standing_height)
-    assert leap.base_speeds(ironcub.with_jets(()))[0] == pytest.approx((2.0 * 9.80665 * 0.43) ** 0.5)
+    assert leap.base_speeds(ironcub.with_jets(()))[0] == pytest.approx(1.5 * (2.0 * 9.80665 * 0.43) ** 0.5)
     stated = replace(scenario, base_speed_max=3.0, com_range=(1.0, 1.0, 0.9))
     assert (stated.base_speeds(small), stated.com_box(small)) == ((3.0, 3.0), (1.0, 1.0, 0.9))
 

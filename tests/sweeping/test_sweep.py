@@ -17,6 +17,7 @@ import pytest
 
 import multimodal_to as mt
 from multimodal_to.errors import InputError, ModelError, OutputError, ScenarioError
+from multimodal_to.scenarios.data import from_dict
 from multimodal_to.sweeping import Design, engines, plan, read_design
 from multimodal_to.sweeping import sweep as sweeping
 from multimodal_to.sweeping.engines import Ended, Processes
@@ -417,3 +418,41 @@ def test_the_page_shows_the_iterations_over_each_number_that_varies_also_those_o
     (drawn,) = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', page)
     labels = re.findall("<!-- (f[^>]+) -->", base64.b64decode(drawn).decode())
     assert labels == ["friction", "final_com 1", "final_com 3"]
+
+
+def test_a_sweep_takes_starter_tasks_by_the_words_of_solve(tmp_path):
+    file = tmp_path / "s.toml"
+    file.write_text(
+        'scenario = "jump"\nrobot = "solo12"\n[grid]\nheight = [0.03, 0.05]\nknots = [90]\n', encoding="utf-8"
+    )
+    design, solo = read_design(file), mt.load_robot("solo12")
+    rows = list(design.rows())
+    assert [row.inputs for row in rows] == [{"height": 0.03, "knots": 90}, {"height": 0.05, "knots": 90}]
+    for row in rows:
+        task = mt.tasks.find("jump", solo, [f"height={row.inputs['height']}", "knots=90"])
+        assert from_dict(row.scenario) == task
+    assert Design.of_plain(json.loads(json.dumps(design.plain()))) == design
+
+
+def test_a_name_of_both_is_found_for_each_robot_of_a_sweep(tmp_path):
+    file = tmp_path / "s.toml"
+    file.write_text('scenario = "jump"\nrobot = ["ironcub", "solo12"]\n', encoding="utf-8")
+    cub, dog = read_design(file).rows()
+    assert from_dict(cub.scenario) == mt.scenarios.jump()
+    assert from_dict(dog.scenario) == mt.tasks.jump(mt.load_robot("solo12"))
+
+
+def test_a_starter_task_that_no_robot_of_the_sweep_can_do_is_refused(tmp_path):
+    file = tmp_path / "s.toml"
+    for text, match in (
+        ('scenario = "trot"\nrobot = "talos"', "expected four for a trot"),
+        ('scenario = "jump"\nrobot = "solo12"\n[grid]\nhight = [0.1]', "unknown key 'hight'; did you mean 'height'"),
+    ):
+        file.write_text(text, encoding="utf-8")
+        with pytest.raises(ScenarioError, match=match):
+            list(read_design(file).rows())
+
+
+def test_a_robot_whose_urdf_is_in_a_package_can_be_changed(tmp_path):
+    solo, heavier = mt.load_robot("solo12"), mt.load_robot(variant("solo12", {"robot.mass": 1.1}, tmp_path))
+    assert heavier.mass == pytest.approx(1.1 * solo.mass)

@@ -107,7 +107,7 @@ def test_a_robot_of_three_times_the_size_gets_the_same_task_in_its_own_units(tmp
     small, large = (scaled(tmp_path / str(size), size) for size in (1.0, 3.0))
     assert large.mass == pytest.approx(27.0 * small.mass)
     assert large.standing_height == pytest.approx(3.0 * small.standing_height)
-    here, there = mt.tasks.jump(small), mt.tasks.jump(large)
+    here, there = (mt.tasks.jump(robot, height=0.1 * robot.standing_height) for robot in (small, large))
     assert here.knots == there.knots
     assert in_own_units(here, small.units) == pytest.approx(in_own_units(there, large.units))
 
@@ -166,3 +166,19 @@ def test_the_command_line_takes_starter_tasks():
     refused = run("doctor", "hover", "--robot", "solo12")
     assert refused.returncode == 2
     assert "solo12 has no jets; expected some for 'hover'" in refused.stdout.replace("\n", " ")
+
+
+def test_a_bundled_scenario_is_in_the_units_of_the_robot_that_it_is_not_written_for_and_ahead_of_it():
+    cub, mk3 = mt.load_robot("ironcub"), mt.load_robot("ironcub-mk3")
+    assert mt.tasks.find("walk-to-fly", cub) == mt.scenarios.walk_to_fly()
+    own, written = mt.tasks.find("step-up", mk3), mt.scenarios.step_up()
+    taller = mk3.standing_height / cub.standing_height
+    assert own.initial_com[2] == pytest.approx(taller * written.initial_com[2], rel=1e-4)
+    assert own.final_com[0] == pytest.approx(-taller * written.final_com[0], rel=1e-4)  # it looks the other way
+    assert own.surface.direction == (1.0, 0.0)
+    assert own.surface.heights == pytest.approx([taller * height for height in written.surface.heights], rel=1e-4)
+    assert own.interval_max == pytest.approx(taller**0.5 * written.interval_max, rel=1e-4)
+    heavier = mk3.weight / cub.weight
+    assert own.weights.contact_forces * heavier**2 * taller**0.5 == pytest.approx(
+        written.weights.contact_forces, rel=1e-3
+    )

@@ -86,7 +86,7 @@ def margin_findings(motion: Motion, scenario: Scenario | None) -> list[Worst]:
         findings.append(worst_of("centre of pressure", shares, tuple(sole.foot for sole in feet)))
     margins = scenario.margins if scenario else Margins.none()
     if margins.touch_down_speed > 0.0:
-        falls = -np.diff(heights, axis=1) / steps - DESCENT_RATE * robot.rate_unit * heights[:, 1:]
+        falls = -np.diff(heights, axis=1) / steps - DESCENT_RATE * robot.units.frequency * heights[:, 1:]
         findings.append(worst_of("touch-down speed", falls, robot.contact_names, first=1))
     if margins != Margins.none():
         moves = np.einsum("ckxt,ckx->ckt", tangents[:, 1:], np.diff(motion.points, axis=1))

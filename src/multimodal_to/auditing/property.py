@@ -104,7 +104,7 @@ class Of(Enum):
             Of.HEIGHT: robot.standing_height,
             Of.MOMENT: robot.weight * robot.standing_height,
             Of.POINT_MOMENT: robot.weight * robot.standing_height / max(len(robot.contacts), 1),
-            Of.SPEED: robot.speed_unit,
+            Of.SPEED: robot.units.of("m/s"),
             Of.THRUST: min((jet.thrust_max for jet in robot.jets), default=math.inf),
         }[self]
 

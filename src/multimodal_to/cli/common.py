@@ -82,7 +82,7 @@ def chosen(name: str, settings: list[str] | None, *, robot: str = "", paper: boo
     if paper:
         return change(as_in_paper(name), settings or ())
     refuse_unknown(name)  # before a robot is read
-    if name in TASKS:
+    if name in TASKS or robot:
         return find(name, load_robot(robot or DEFAULT_ROBOT), settings or ())
     return change(bundled(name), settings or ())
 

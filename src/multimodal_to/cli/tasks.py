@@ -81,7 +81,9 @@ def given(
     if scenario is None:
         raise ScenarioError(f"'{resume}' keeps no scenario to go on with; name one and start from it by --warm-start")
     asked = (
-        change(scenario, settings or ()) if name is None else chosen(name, settings, paper=start.rule == BACKWARD_EULER)
+        change(scenario, settings or ())
+        if name is None
+        else chosen(name, settings, robot=robot or start.robot, paper=start.rule == BACKWARD_EULER)
     )
     whose = robot or ("" if name is None else asked.robot) or start.robot  # no path that the file alone names
     asked = replace(asked.for_robot(load_robot(whose)), robot=None)

@@ -106,8 +106,8 @@ def _swings(task: Task, schedule: Schedule) -> Iterator[Symptom]:
     if not task.held(margins.TOUCH_DOWN) or not scenario.margins.touch_down_speed:
         return
     step = scenario.interval_max
-    way = scenario.margins.touch_down_speed * robot.speed_unit * step
-    gain = 1.0 + DESCENT_RATE * robot.rate_unit * step
+    way = scenario.margins.touch_down_speed * robot.units.of("m/s") * step
+    gain = 1.0 + DESCENT_RATE * robot.units.frequency * step
     for point, knot in np.argwhere(schedule.clearance > 0.0):
         down = next((k for k in range(knot, scenario.knots + 1) if schedule.stands[point, k]), None)
         if down is None:

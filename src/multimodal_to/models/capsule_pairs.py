@@ -5,7 +5,7 @@ Nothing is chosen by chance: the random postures are the same in every run.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -28,18 +28,23 @@ MEET = 0.001
 
 
 def apart_at_home(
-    kindyn: KinDynComputations, home: Array, capsules: Sequence[Capsule], standing_height: float
+    kindyn: KinDynComputations,
+    home: Array,
+    capsules: Sequence[Capsule],
+    standing_height: float,
+    stated: Collection[frozenset[str]] = (),
 ) -> dict[CapsulePair, float]:
     """Return the pairs that have to keep apart, each with its distance at home [m].
 
     Left out are pairs with fewer than `FEWEST_JOINTS` joints between their bodies, pairs of two plumes, and pairs that
-    are nearer than `AT_HOME` L at home.
+    are nearer than `AT_HOME` L at home. A pair that is stated is left out only where it overlaps at home.
 
     Args:
         kindyn: kinematics of the robot.
         home: positions of the joints at home, (n,).
         capsules: of links and plumes.
         standing_height: L [m].
+        stated: pairs that shall keep apart, by the names of their capsules.
     """
     tree = kindyn.tree
     pairs = [
@@ -51,7 +56,7 @@ def apart_at_home(
     return {
         pair: float(distance)
         for pair, distance in zip(pairs, at_home, strict=True)
-        if distance >= AT_HOME * standing_height
+        if distance >= (0.0 if frozenset(one.name for one in pair) in stated else AT_HOME * standing_height)
     }
 
 

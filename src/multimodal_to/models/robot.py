@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -208,23 +207,15 @@ class Robot(Value):
         return 0.0, 0.0, -float(contacts[:, 2].min())
 
     @property
-    def speed_unit(self) -> float:
-        """Return √(|g| L) [m/s], the robot's own unit of speed."""
-        return math.sqrt(float(np.linalg.norm(self.gravity)) * self.standing_height)
-
-    @property
-    def rate_unit(self) -> float:
-        """Return √(|g| / L) [1/s], the robot's own unit of rates; a pendulum of its height has this frequency."""
-        return math.sqrt(float(np.linalg.norm(self.gravity)) / self.standing_height)
-
-    @property
     def capsules(self) -> tuple[Capsule, ...]:
         """Return the shapes of links, then the plumes of the jets that are in use."""
         return (*self.link_capsules, *(jet.plume for jet in self.jets if jet.plume is not None))
 
     @cached_property
     def _apart_at_home(self) -> dict[CapsulePair, float]:
-        pairs = capsule_pairs.apart_at_home(self.kindyn, self.home.joint_positions, self.capsules, self.standing_height)
+        pairs = capsule_pairs.apart_at_home(
+            self.kindyn, self.home.joint_positions, self.capsules, self.standing_height, self.held_pairs
+        )
         return {pair: away for pair, away in pairs.items() if frozenset(c.name for c in pair) not in self.ignored_pairs}
 
     @cached_property
@@ -240,7 +231,7 @@ class Robot(Value):
         L at home, and can meet within the ranges of the joints.
 
         Raises:
-            ModelError: two capsules of `held_pairs` are neighbours, or touch at home, or are ignored.
+            ModelError: two capsules of `held_pairs` are neighbours, or overlap at home, or are ignored.
         """
         if self.held_pairs:
             return self._stated_pairs()
@@ -255,7 +246,7 @@ class Robot(Value):
             if names <= present and names not in by_names:
                 raise ModelError(
                     f"the capsules {listed(sorted(names))} cannot be held apart: they are neighbours in the tree, or "
-                    "touch at home, or are ignored"
+                    "overlap at home, or are ignored"
                 )
         return tuple(pair for names, pair in by_names.items() if names in self.held_pairs)
 

@@ -106,7 +106,7 @@ def skimming(interval: Interval, parameters: Parameters) -> SX:
     """
     robot, rows = parameters.robot, []
     for before, after in zip(interval.start.points, interval.end.points, strict=True):
-        along = parameters.surface.tangents(after).T @ (after - before) / (interval.duration * robot.speed_unit)
+        along = parameters.surface.tangents(after).T @ (after - before) / (interval.duration * robot.units.of("m/s"))
         height = 0.5 * (parameters.surface.distance(before) + parameters.surface.distance(after))
         rows.append(along / cs.sqrt(1 + (height / (SKIM_HEIGHT * robot.standing_height)) ** 2))
     return cs.vertcat(cs.SX(0, 1), *rows)

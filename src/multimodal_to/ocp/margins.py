@@ -117,8 +117,8 @@ def centre_of_pressure(knot: Knot, parameters: Parameters) -> SX:
 def touch_down(interval: Interval, parameters: Parameters) -> SX:
     """(Δt (v + κ d⁺) − (d − d⁺)) / L: a point comes down the slower the nearer it is to the ground."""
     robot = parameters.robot
-    speed = parameters.scenario.margins.touch_down_speed * robot.speed_unit
-    rate = contact.DESCENT_RATE * robot.rate_unit
+    speed = parameters.scenario.margins.touch_down_speed * robot.units.of("m/s")
+    rate = contact.DESCENT_RATE * robot.units.frequency
     rows = []
     for before, after in zip(interval.start.points, interval.end.points, strict=True):
         low = parameters.surface.distance(after)

@@ -118,15 +118,24 @@ def change(scenario: Scenario, settings: Iterable[str]) -> Scenario:
     Raises:
         ScenarioError: a text is no `key=value`, names an unknown key, or has a wrong value.
     """
+    return changed(scenario, dict(map(parted, settings)))
+
+
+@checked
+def changed(scenario: Scenario, values: Mapping[str, Any]) -> Scenario:
+    """Return a scenario with values changed by dotted keys, as `{"weights.thrust": 3.0}`.
+
+    Raises:
+        ScenarioError: a key is unknown, a value is wrong, or one key gives a table that another gives an entry of.
+    """
     table: dict[str, Any] = {}
-    for setting in settings:
-        key, value = parted(setting)
+    for key, value in values.items():
         *parents, last = key.split(".")
         place = table
         for parent in parents:
             place = place.setdefault(parent, {})
             if not isinstance(place, dict):
-                raise ScenarioError(f"'{shortened(setting, 100)}': another change gives '{parent}' as a whole")
+                raise ScenarioError(f"'{shortened(key, 100)}': another change gives '{parent}' as a whole")
         place[last] = value
     return from_dict(table, scenario)
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import itertools
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -16,12 +17,13 @@ import numpy as np
 from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, MultimodalError, listed, shown
 from multimodal_to.files.reading import is_number, read_toml
-from multimodal_to.models.robot import bundled_robots
+from multimodal_to.models.robot import Robot, bundled_robots, load_robot
 from multimodal_to.scenarios import find
 from multimodal_to.scenarios.data import from_dict, to_dict
-from multimodal_to.scenarios.files import load
+from multimodal_to.scenarios.files import changed, load
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.sweeping.variants import PREFIX, check_key
+from multimodal_to.tasks.finding import asked, follows_from, refuse_unknown
 
 MOST_ROWS = 1_000_000
 """The most plans of a sweep."""
@@ -43,15 +45,16 @@ class Row:
 class Design:
     """A sweep: every combination of scenarios, robots, the grid, the list and the draws.
 
-    A key is one of a scenario, as `--set` takes it (`final_com_height`, `weights.thrust`), or of the robot
-    (`variants.KEYS`). A draw takes every random key at once; the draws of a row follow from the seed and the row's
-    index alone.
+    A name among the scenarios is that of a task, which is found for each robot as `solve` does: a starter task. A key
+    is one of a scenario or of a starter task, as `--set` takes it (`final_com_height`, `weights.thrust`, `height`), or
+    of the robot (`variants.KEYS`). A starter task follows from the robot as it is before any such change. A draw takes
+    every random key at once; the draws of a row follow from the seed and the row's index alone.
 
     Raises:
         InputError: two parts vary one key, lists differ in length, a range is none, or there are too many rows.
     """
 
-    scenarios: tuple[Scenario, ...]
+    scenarios: tuple[Scenario | str, ...]
     robots: tuple[str, ...] = ("ironcub",)
     settings: Mapping[str, Any] = field(default_factory=dict)  # the same in every row
     grid: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)  # every combination
@@ -107,39 +110,45 @@ class Design:
         combinations = itertools.product(
             self.scenarios, self.robots, itertools.product(*self.grid.values()), range(entries), range(self.draws)
         )
+        found: dict[str, Robot] = {}  # that starter tasks are made for
         for index, (scenario, robot, values, entry, _) in enumerate(combinations):
+            if isinstance(scenario, str) and robot not in found:
+                found[robot] = load_robot(robot)
             inputs: dict[str, Any] = {}
             if len(self.scenarios) > 1:
-                inputs["scenario"] = scenario.name
+                inputs["scenario"] = scenario if isinstance(scenario, str) else scenario.name
             if len(self.robots) > 1:
                 inputs["robot"] = robot
             inputs |= dict(zip(self.grid, values, strict=True))
             inputs |= {key: some[entry] for key, some in self.listed.items()}
             inputs |= self._drawn(index)
-            yield self._row(index, scenario, robot, inputs)
+            made = partial(asked, scenario, found[robot]) if isinstance(scenario, str) else partial(changed, scenario)
+            yield self._row(index, made, robot, inputs)
 
     def _drawn(self, index: int) -> dict[str, Any]:
         rng = np.random.default_rng([self.seed, index])
         drawn: dict[str, Any] = {key: np.asarray(rng.uniform(*ends)).tolist() for key, ends in self.between.items()}
         return drawn | {key: some[int(rng.integers(len(some)))] for key, some in self.among.items()}
 
-    def _row(self, index: int, scenario: Scenario, robot: str, inputs: Mapping[str, Any]) -> Row:
+    def _row(
+        self, index: int, made: Callable[[Mapping[str, Any]], Scenario], robot: str, inputs: Mapping[str, Any]
+    ) -> Row:
         """Return a row.
 
         Args:
             index: of the row.
-            scenario: before any change.
+            made: the scenario with changes by dotted keys.
             robot: before any change.
             inputs: what varies.
         """
         changes = {key: value for key, value in {**self.settings, **inputs}.items() if key not in ("scenario", "robot")}
         of_robot = {key: value for key, value in changes.items() if key.startswith(PREFIX)}
-        table = nested({key: value for key, value in changes.items() if key not in of_robot})
+        values = {key: value for key, value in changes.items() if key not in of_robot}
         return Row(
             index=index,
             robot=robot,
             robot_changes=of_robot,
-            scenario=to_dict(from_dict(table, scenario)),
+            scenario=to_dict(made(values)),
             inputs=inputs,
             seed=self.seed if self.between or self.among else None,
         )
@@ -151,7 +160,7 @@ class Design:
     def plain(self) -> dict[str, Any]:
         """Return the sweep as what JSON can hold."""
         return {
-            "scenarios": [to_dict(scenario) for scenario in self.scenarios],
+            "scenarios": [one if isinstance(one, str) else to_dict(one) for one in self.scenarios],
             "robots": list(self.robots),
             "settings": dict(self.settings),
             "grid": {key: list(values) for key, values in self.grid.items()},
@@ -170,31 +179,13 @@ class Design:
             key: {name: tuple(map(_tuple, values)) for name, values in table[key].items()}
             for key in ("grid", "listed", "between", "among")
         }
-        scenarios = tuple(from_dict(scenario) for scenario in table["scenarios"])
+        scenarios = tuple(one if isinstance(one, str) else from_dict(one) for one in table["scenarios"])
         plain: dict[str, Any] = {key: table[key] for key in ("settings", "draws", "seed")} | of_lists
         return cls(scenarios=scenarios, robots=tuple(table["robots"]), **plain)
 
 
 def _tuple(value: Any) -> Any:
     return tuple(map(_tuple, value)) if isinstance(value, list) else value
-
-
-def nested(changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `{"weights": {"thrust": 3}}` of `{"weights.thrust": 3}`.
-
-    Raises:
-        InputError: one key gives a table that another gives an entry of.
-    """
-    table: dict[str, Any] = {}
-    for key, value in changes.items():
-        *parents, last = key.split(".")
-        place = table
-        for parent in parents:
-            place = place.setdefault(parent, {})
-            if not isinstance(place, dict):
-                raise InputError(f"'{key}': another key gives '{parent}' as a whole")
-        place[last] = value
-    return table
 
 
 # ---------------------------------------------------------------- the file
@@ -208,7 +199,7 @@ def read_design(path: str | os.PathLike[str]) -> Design:
     """Return the sweep of a TOML file; paths in it are from its folder.
 
     ```toml
-    scenario = "take-off"            # a bundled one, a TOML file, or a list of them
+    scenario = "take-off"            # a task as `solve` takes it, a TOML file, or a list of them
     robot = "ironcub"                # a bundled one, a folder, or a list of them
     [settings]                       # the same in every plan
     knots = 20
@@ -240,13 +231,14 @@ def _design(table: dict[str, Any], folder: Path) -> Design:
     random = _table(table, "random")
     _refuse_strangers(random, _RANDOM, "[random]")
     names = _texts(table.get("scenario", []), "scenario")
+    robots = tuple(_robot(name, folder) for name in _texts(table.get("robot", "ironcub"), "robot"))
     for key in ("draws", "seed"):
         if not isinstance(random.get(key, 1), int) or isinstance(random.get(key, 1), bool):
             raise InputError(f"'{key}' is {shown(random[key])}; expected a whole number")
     between = {key: _range(key, value) for key, value in _table(random, "between").items()}
     return Design(
-        scenarios=tuple(_scenario(name, folder) for name in names),
-        robots=tuple(_robot(name, folder) for name in _texts(table.get("robot", "ironcub"), "robot")),
+        scenarios=tuple(_scenario(name, folder, robots) for name in names),
+        robots=robots,
         settings=_flat(_table(table, "settings")),
         grid={key: _values(key, value) for key, value in _table(table, "grid").items()},
         listed={key: _values(key, value) for key, value in _table(table, "list").items()},
@@ -276,8 +268,18 @@ def _texts(value: Any, key: str) -> list[str]:
     return values
 
 
-def _scenario(name: str, folder: Path) -> Scenario:
-    return load(folder / name) if name.endswith(".toml") else find(name)
+def _scenario(name: str, folder: Path, robots: Sequence[str]) -> Scenario | str:
+    """Return the scenario of a name or a file; the name itself where its numbers follow from one of the robots.
+
+    Args:
+        name: in the sweep's file.
+        folder: of that file.
+        robots: of the sweep.
+    """
+    if name.endswith(".toml"):
+        return load(folder / name)
+    refuse_unknown(name)
+    return name if any(follows_from(name, load_robot(robot).name) for robot in robots) else find(name)
 
 
 def _robot(name: str, folder: Path) -> str:

@@ -62,10 +62,11 @@ def variant(robot: str, changes: Mapping[str, Any], folder: Path) -> Path:
     target = folder / sha256(text.encode()).hexdigest()[:16]
     if (target / ROBOT_FILE).exists():
         return target
-    table = read_toml(source / ROBOT_FILE, ModelError)
-    root = etree.parse(
-        str(source / table["urdf"]), etree.XMLParser(resolve_entities=False, load_dtd=False, no_network=True)
-    ).getroot()
+    table, before = read_toml(source / ROBOT_FILE, ModelError), load_robot(robot)
+    parser = etree.XMLParser(resolve_entities=False, load_dtd=False, no_network=True)
+    root = etree.parse(str(before.urdf), parser).getroot()
+    if "://" in table["urdf"]:
+        table["urdf"] = before.urdf.name  # the changed one is a file of its own
     for key, value in changes.items():
         _change(key, value, table, root)
     try:
@@ -76,7 +77,7 @@ def variant(robot: str, changes: Mapping[str, Any], folder: Path) -> Path:
                 etree.tostring(etree.ElementTree(root), encoding="utf-8", xml_declaration=True)
             )
             write_text(made / ROBOT_FILE, tomli_w.dumps(table))
-            write_text(made / ROBOT_FILE, tomli_w.dumps(_on_its_feet(load_robot(robot), table, made)))
+            write_text(made / ROBOT_FILE, tomli_w.dumps(_on_its_feet(before, table, made)))
             with suppress(OSError):  # the other was first
                 made.replace(target)
     except OSError as error:

@@ -13,9 +13,10 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.bundled import SCENARIOS
 from multimodal_to.scenarios.bundled import find as bundled
 from multimodal_to.scenarios.data import HEIGHTS, RECORDS
-from multimodal_to.scenarios.files import change, parted
+from multimodal_to.scenarios.files import changed, parted
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.tasks import in_air, on_feet
+from multimodal_to.tasks.sizing import sized
 from multimodal_to.values import FrozenMapping
 
 TASKS: Mapping[str, Callable[..., Scenario]] = FrozenMapping(
@@ -32,7 +33,7 @@ TASKS: Mapping[str, Callable[..., Scenario]] = FrozenMapping(
 )
 """The starter tasks by name."""
 BUNDLED_FOR = ("ironcub", "ironcub-mk3")
-"""The robots, by name, for which a name that both have is the bundled scenario."""
+"""The robots, by name, for which a name that both have is the bundled scenario; it is written for the first."""
 
 
 def numbers(name: str) -> Mapping[str, Any]:
@@ -46,12 +47,18 @@ def is_starter(name: str, robot: str) -> bool:
     return name in TASKS and not (name in SCENARIOS and robot in BUNDLED_FOR)
 
 
+def follows_from(name: str, robot: str) -> bool:
+    """Return whether the numbers of the task of a name follow from the robot of a name."""
+    return is_starter(name, robot) or robot in BUNDLED_FOR[1:]
+
+
 @checked
 def find(name: str, robot: Robot, settings: Iterable[str] = ()) -> Scenario:
     """Return the task of a name for a robot: a starter task, or a bundled scenario.
 
     `jump` and `take-off` are names of both: they are the bundled scenarios for the robots of `BUNDLED_FOR`, and the
-    starter tasks for any other.
+    starter tasks for any other. Those of `BUNDLED_FOR` behind the first get bundled scenarios of their own size, by
+    `sizing.sized`.
 
     Args:
         name: of the task.
@@ -62,19 +69,34 @@ def find(name: str, robot: Robot, settings: Iterable[str] = ()) -> Scenario:
     Raises:
         ScenarioError: there is none of that name, the robot cannot do it, or a change is wrong.
     """
+    return asked(name, robot, dict(map(parted, settings)))
+
+
+@checked
+def asked(name: str, robot: Robot, values: Mapping[str, Any]) -> Scenario:
+    """Return what `find` does, with changes by dotted keys, as `{"height": 0.1, "weights.thrust": 3.0}`.
+
+    Args:
+        name: of the task.
+        robot: that does it.
+        values: by key, as a file has them.
+
+    Raises:
+        ScenarioError: there is none of that name, the robot cannot do it, or a change is wrong.
+    """
     if not is_starter(name, robot.name):
         refuse_unknown(name)
-        return change(bundled(name), settings)
-    hints, said, rest = numbers(name), dict[str, Any](), list[str]()
-    for setting in settings:
-        key, value = parted(setting)
+        scenario = bundled(name)
+        return changed(sized(scenario, robot) if robot.name in BUNDLED_FOR[1:] else scenario, values)
+    hints, said, rest = numbers(name), dict[str, Any](), dict[str, Any]()
+    for key, value in values.items():
         if key in hints:
             said[key] = RECORDS.value(hints[key], value, key)
         elif key.partition(".")[0] in (known := [*hints, *(entry.name for entry in fields(Scenario)), *HEIGHTS]):
-            rest.append(setting)
+            rest[key] = value
         else:
             raise ScenarioError(unknown("key", key, known))
-    return change(TASKS[name](robot, **said), rest)
+    return changed(TASKS[name](robot, **said), rest)
 
 
 def refuse_unknown(name: str) -> None:

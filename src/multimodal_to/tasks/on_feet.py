@@ -14,10 +14,13 @@ from multimodal_to.scenarios.keyframes import HOME, Keyframe, Momentum
 from multimodal_to.scenarios.scenario import Margins, Scenario, Terminal
 from multimodal_to.tasks.costs import weights
 from multimodal_to.tasks.given import given, looks, positive, refuse_footless
+from multimodal_to.tasks.leaping import leap_height
 from multimodal_to.trajectory.instants import END
 
 DEPTH, HEIGHT = 0.2, 0.15
-"""How far a robot squats and jumps by default [L]."""
+"""How far a robot squats and jumps by default, the latter at most [L]."""
+LEAST = 0.02
+"""A robot whose motors throw it less high is refused to jump by default [L]."""
 DISTANCE = {GaitKind.WALK: 0.8, GaitKind.TROT: 1.5, GaitKind.BOUND: 0.8, GaitKind.JUMP: 0.6}
 """How far it gets by default [L]."""
 STRIDE = {GaitKind.WALK: 0.4, GaitKind.TROT: 0.8, GaitKind.BOUND: 0.5, GaitKind.JUMP: 0.3}
@@ -54,19 +57,21 @@ def jump(robot: Robot, *, height: float | None = None) -> Scenario:
 
     Args:
         robot: that jumps; its jets are off.
-        height: h, how far the CoM rises above home [m]; 0.15 L where it is not said.
+        height: h, how far the CoM rises above home [m]; where it is not said 0.15 L, or `leap_height` where that is
+            less.
 
     Raises:
-        ScenarioError: the robot has no feet or no legs, there is no gravity, or the height is no positive number.
+        ScenarioError: the robot has no feet or no legs, there is no gravity, the height is no positive number, or
+            none is said and the joints are too weak or too slow.
     """
     _refuse_stiff(robot, "a jump")
-    length, strength = robot.standing_height, robot.speed_unit**2 / robot.standing_height
-    height = positive("height", HEIGHT * length if height is None else height, "m")
-    if not strength:
+    length = robot.standing_height
+    if not robot.weight:
         raise ScenarioError(
             f"{robot.name} is without gravity; expected some for a jump, which ends where it falls back"
         )
-    flight = 2.0 * math.sqrt(2.0 * height / strength) * robot.rate_unit  # in units of time
+    height = _easy_height(robot) if height is None else positive("height", height, "m")
+    flight = 2.0 * math.sqrt(2.0 * height / length)  # in units of time
     in_air, before = max(round(flight / 0.06), 4), 40
     knots = 2 * before + in_air
     begin, end = before / knots, (before + in_air) / knots
@@ -188,3 +193,18 @@ def _refuse_stiff(robot: Robot, what: str) -> None:
     refuse_footless(robot, what.split()[-1])
     if not robot.joint_names:
         raise ScenarioError(f"{robot.name} has no joints; expected a robot with legs that move for {what}")
+
+
+def _easy_height(robot: Robot) -> float:
+    """Return how high a robot jumps by default [m]: `HEIGHT` L, or what its motors can do where that is less.
+
+    Raises:
+        ScenarioError: its motors are too weak or too slow.
+    """
+    height = leap_height(robot)
+    if height < LEAST * robot.standing_height:
+        raise ScenarioError(
+            f"the joints of {robot.name} are too weak or too slow for a jump: they throw it {1000.0 * height:.2g} mm "
+            "high at most; expected stronger and faster ones, or a height [m] to try"
+        )
+    return min(HEIGHT * robot.standing_height, height)

@@ -1,0 +1,81 @@
+"""A bundled scenario for a robot of another size than the iRonCub, for which its numbers are written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from multimodal_to.models.robot import Robot
+from multimodal_to.models.terrain import Stairs
+from multimodal_to.models.units import Sized
+from multimodal_to.scenarios.scenario import Scenario, Vector3
+from multimodal_to.tasks.given import looks
+from multimodal_to.values import FrozenMapping
+
+_RUNNING: Mapping[str, str] = FrozenMapping(
+    {
+        "com_velocity": "m/s",
+        "com_acceleration": "m/s²",
+        "angular_momentum": "kg m²/s",
+        "angular_momentum_rate": "N m",
+        "posture": "rad",
+        "base_orientation": "1",
+        "contact_forces": "N",
+        "contact_force_rates": "N/s",
+        "thrust": "N",
+        "throttle": "1",
+        "throttle_rate": "1/s",
+        "joint_accelerations": "rad/s²",
+        "foot_tilt": "1",
+        "skimming": "1",
+    }
+)
+"""The running weights of the bundled scenarios, and the unit of what each weighs."""
+_SKIMMING = 1e7
+"""The least weight of feet that move along the ground close to it: bent legs of another robot glide at lift-off."""
+
+
+def sized(scenario: Scenario, robot: Robot) -> Scenario:
+    """Return a bundled scenario in the units m, L and √(L/g) of a robot (W. Froude, 1874), ahead of it.
+
+    Lengths and times, the weights, and ε_t are those of the iRonCub times the ratio of the robots' units. Feet that
+    glide at lift-off have at least the weight `_SKIMMING`.
+
+    Args:
+        scenario: one of `scenarios.SCENARIOS`.
+        robot: that shall do it.
+    """
+
+    def by(unit: str) -> float:
+        return Sized(1.0, unit).of(robot.units)
+
+    length, time, ahead = by("m"), by("s"), -looks(robot)  # the iRonCub looks towards −x
+
+    def there(com: Any) -> Vector3:
+        x, y, z = com
+        return ahead * length * x, ahead * length * y, length * z
+
+    weights = replace(scenario.weights, skimming=max(scenario.weights.skimming, _SKIMMING))
+    speeds = {group: weight / (by("rad/s") ** 2 * time) for group, weight in weights.joint_velocities.items()}
+    running = {name: getattr(weights, name) / (by(unit) ** 2 * time) for name, unit in _RUNNING.items()}
+    changed: dict[str, Any] = {
+        "initial_com": there(scenario.initial_com),
+        "final_com": there(scenario.final_com),
+        "interval_min": time * scenario.interval_min,
+        "interval_max": time * scenario.interval_max,
+        "weights": replace(weights, joint_velocities=speeds, **running),
+    }
+    if scenario.mid_height_min is not None:
+        changed["mid_height_min"] = length * scenario.mid_height_min
+    if scenario.sliding_max is not None:
+        changed["sliding_max"] = Sized(scenario.sliding_max, "N m", of_a_point=True).of(robot.units)
+    if isinstance(stairs := scenario.surface, Stairs):
+        x, y = stairs.direction
+        changed["surface"] = Stairs(
+            edges=tuple(length * edge for edge in stairs.edges),
+            heights=tuple(length * height for height in stairs.heights),
+            direction=(ahead * x, ahead * y),
+            width=length * stairs.width,
+        )
+    return replace(scenario, **changed)
