@@ -43,7 +43,17 @@ from multimodal_to.models.robot import bundled_robots
 from multimodal_to.models.terrain import HeightField, Plane, Stairs
 from multimodal_to.replay.dress import read_dress
 from multimodal_to.replay.visuals import appearance
-from multimodal_to.scenarios import Box, ContactState, ContactStretch, GaitKind, GaitPlan, JetFailure, KnownPush, Wall
+from multimodal_to.scenarios import (
+    Box,
+    ContactState,
+    ContactStretch,
+    GaitKind,
+    GaitPlan,
+    JetFailure,
+    KnownPush,
+    Limits,
+    Wall,
+)
 from multimodal_to.scenarios.data import stored, to_json
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 from multimodal_to.trajectory.importing import import_arrays
@@ -481,6 +491,7 @@ def sources(kind: str, folder: Path) -> list[Source]:
                 pushes=(KnownPush(of="chest", force=(10.0, 0.0, 0.0), begin=0.4, end=0.5),),
                 walls=(Wall(normal=(0.0, 0.0, -1.0), offset=-1.5, of=("head",)),),
                 boxes=(Box(lower=(0.0, 0.0, 0.0), upper=(1.0, 1.0, 1.0), begin=0.5),),
+                limits=(Limits(base_speed=0.5, joint_speeds={"legs": 1.0}, thrusts={"left arm": 90.0}, end=0.8),),
             )
         )
         short = b'based_on = "take-off"\nfinal_com_height = 0.8\nweights.thrust = 3\nsurface = "flat"\n'

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import inspect
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -260,6 +261,8 @@ def _first_paragraph(text: str) -> str:
 
 
 def _units(term: Constraint | Cost) -> str:
+    if inspect.isfunction(term.unit):
+        return _first_paragraph(term.unit.__doc__ or "")
     if isinstance(term.unit, str) or callable(term.unit):
         return str(term.unit)
     return ", ".join(dict.fromkeys(term.unit))
@@ -281,7 +284,8 @@ def _places(term: Constraint | Cost, tasks: Mapping[str, Parameters]) -> str:
     text = ", ".join(place.value for place in term.places)
     if term.when is None:
         return text
-    return f"{text}; in {', '.join(name for name, parameters in tasks.items() if term.exists(parameters))}"
+    there = ", ".join(name for name, parameters in tasks.items() if term.exists(parameters))
+    return f"{text}; in {there or 'no bundled scenario'}"
 
 
 # ---------------------------------------------------------------- the rooms

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import multimodal_to as mt
 from multimodal_to.replay import write_html
+from multimodal_to.simulation import play, tracking
 from multimodal_to.trajectory.derived import flight_phases, largest_torques
 
 task = mt.scenario_files.load(Path(__file__).parent / "jump-onto-box.toml")
@@ -19,6 +20,7 @@ heights = trajectory.com_position[2]
 print(f"CoM: crouches to {heights.min():.2f} m, rises to {heights[50:67].max():.2f} m, stands at {heights[-1]:.2f} m")
 hardest = largest_torques(robot, trajectory)[0]
 print(f"hardest motor: {hardest.joint}, {hardest.over_effort:.0%} of its limit")
+print("MuJoCo: it", tracking(play(robot, trajectory)).end)
 
 folder = Path("results/jump-onto-box")
 folder.mkdir(parents=True, exist_ok=True)

@@ -39,6 +39,15 @@ def a_jet_has_failed(printed, trajectory):
     assert np.abs(trajectory.thrust[trajectory.jet_names.index("left chest")]).max() < 1e-6
 
 
+def it_lands_on_the_box(printed, trajectory):
+    """Heels that land on the edge of the box slip off it in MuJoCo, so they are asked to land beyond it."""
+    assert "MuJoCo: it stands" in printed
+    heels = [row for row, name in enumerate(trajectory.contact_names) if name[-1] in "34"]
+    landed = trajectory.per_contact("contact_positions")[heels, :, 66:]
+    assert landed[:, 0].max() < -0.16 + 1e-5
+    assert landed[:, 2] == pytest.approx(np.full(landed[:, 2].shape, 0.1), abs=1e-4)
+
+
 def a_robot_jumps(printed, trajectory):
     assert printed.count("physically true: True") == 2
     assert "has no jets; expected some for 'take-off'" in printed
@@ -50,6 +59,7 @@ ALSO = {
     "15_trot": it_trots,
     "16_sidesteps": it_steps_aside,
     "17_failed_jet": a_jet_has_failed,
+    "18_jump_onto_box": it_lands_on_the_box,
     "20_first_tasks": a_robot_jumps,
 }
 """What else an example shows; in the same test, since another would wait until the example has run."""

@@ -85,6 +85,7 @@ def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         "Knot": at,
         "Knots": mt.Knots(np.array([1, 2])),
         "KnownPush": mt.KnownPush(of="body", force=[1, 0, 0], begin=0.2),
+        "Limits": mt.Limits(base_speed=1, thrusts={"left": 100}, begin=0.2),
         "Margins": mt.Margins(torque=0.5),
         "Momentum": mt.Momentum(angular={"z": 1.0}),
         "Parameters": mt.Parameters.of(robot, scenario, robot.home),

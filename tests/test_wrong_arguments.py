@@ -60,6 +60,7 @@ def values(robot) -> dict[str, Any]:
         "Knots": mt.Knots((1,)),
         "JetFailure": mt.JetFailure(jet="left arm"),
         "KnownPush": mt.KnownPush(of="chest", force=(1.0, 0.0, 0.0)),
+        "Limits": mt.Limits(base_speed=1.0),
         "Margins": mt.Margins(),
         "Momentum": mt.Momentum(angular={"z": 0.0}),
         "Plane": mt.Plane(slope=0.1),

@@ -20,6 +20,7 @@ from multimodal_to.scenarios import (
     FrameTarget,
     JetFailure,
     Keyframe,
+    Limits,
     Momentum,
     Start,
     Terminal,
@@ -181,6 +182,7 @@ CHANGES = {
     "with contacts": {"contacts": (ContactStretch(of="left", state=ContactState.ON, end=0.5),)},
     "with a jet that fails": {"failures": (JetFailure(jet="left arm", at=0.5),)},
     "under a ceiling": {"walls": (Wall(normal=(0.0, 0.0, -1.0), offset=-2.0),)},
+    "more slowly at the end": {"limits": (Limits(base_speed=0.1, thrusts={"left arm": 100.0}, begin=0.9),)},
 }
 
 

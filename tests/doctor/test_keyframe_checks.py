@@ -13,7 +13,7 @@ from drones import drone
 from hopper import hop
 from hopper import hopper as make_hopper
 from multimodal_to.doctor import Severity
-from multimodal_to.doctor.keyframes import _extent
+from multimodal_to.doctor.posture import extent
 
 HAND = "l_arm_jet_turbine"
 AT_HOME = (-0.25, -0.2415, -0.161)
@@ -50,12 +50,46 @@ def found(robot, task, label="keyframe 1"):
         (
             {"knot": 30, "frames": {HAND: mt.FrameTarget(position=(-0.8, 0.0, 0.7))}, "com": (0.0, 0.0, 0.7)},
             Severity.WARNING,
-            f"with the CoM where it is asked to be, {HAND} was found to come no nearer than",
+            f"asked for at once: CoM x stays 0.0699 m off, {HAND} position x stays",
         ),
         ({"knot": 2, "yaw": 1.0, "hover": True}, Severity.ERROR, "the base has to turn by 1 rad from the start"),
         ({"knot": 3, "yaw": 0.7}, Severity.WARNING, "the base has to turn by 0.7 rad from the start in at most 0.3 s"),
         ({"knot": 40, "standing": True, "com": (0.0, 0.0, 0.7)}, Severity.ERROR, "0.7 m above the feet, beyond"),
         ({"knot": 40, "standing": True, "com": (0.0, 0.0, 0.2)}, Severity.WARNING, "no posture of ironcub"),
+        (
+            {"knot": 30, "com": {"z": 0.7}, "base_position": {"z": 3.0}},
+            Severity.ERROR,
+            "the base has to be 2.3 m from the CoM, and the robot reaches",
+        ),
+        (
+            {"knot": 30, "com": {"z": 0.7}, "base_position": {"z": 0.4}},
+            Severity.WARNING,
+            "no posture was found with all that is asked for at once: ",
+        ),
+        (
+            {"knot": 40, "standing": True, "frames": {"l_sole_1": mt.FrameTarget(position={"z": 0.1})}},
+            Severity.WARNING,
+            "no posture was found with all that is asked for at once: ",
+        ),
+        (
+            {"knot": 40, "hover": True, "base_orientation": (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))},
+            Severity.WARNING,
+            "no posture was found with all that is asked for at once: balance",
+        ),
+        (
+            {
+                "knot": 40,
+                "base_orientation": (0.0, 0.0, 0.0, 1.0),
+                "frames": {"root_link": mt.FrameTarget(orientation=(0.0, 0.0, 0.5, 1.0))},
+            },
+            Severity.WARNING,
+            "no posture was found with all that is asked for at once: ",
+        ),
+        (
+            {"knot": 40, "momentum": mt.Momentum(linear={"x": 1e3})},
+            Severity.WARNING,
+            "linear momentum x asks the CoM to go at",
+        ),
     ],
 )
 def test_a_keyframe_that_cannot_be_met_is_named_with_what_stands_against_it(ironcub, asked, severity, sentence):
@@ -151,4 +185,26 @@ def test_no_posture_has_its_com_beyond_the_extent_from_a_frame(ironcub, seed):
     com = np.array(ironcub.kindyn.CoM_position(np.eye(4), joints)).ravel()
     for frame in (HAND, "l_sole_1"):
         there = np.array(ironcub.kindyn.forward_kinematics(frame, np.eye(4), joints))[:3, 3]
-        assert np.linalg.norm(there - com) < _extent(ironcub, frame)
+        assert np.linalg.norm(there - com) < extent(ironcub, frame)
+
+
+def test_a_way_of_the_base_between_keyframes_that_is_too_long_is_refused(hopper):
+    asked = (mt.Keyframe(knot=20, base_position={"x": 0.0}), mt.Keyframe(knot=21, base_position={"x": 1.2}))
+    (finding,) = found(hopper, hop(hopper, keyframes=asked), "time for the distance")
+    assert "the base has to go 1.2 m along x from keyframe 1 to keyframe 2 in at most 0.2 s" in finding.found
+
+
+def test_a_momentum_that_gravity_cannot_take_in_time_is_refused(ironcub):
+    """From 80 kg m/s up to as much down gravity needs 0.36 s, 18 intervals of 0.02 s."""
+
+    def thrown(knots):
+        asked = (
+            mt.Keyframe(knot=40, momentum=mt.Momentum(linear={"z": 80.0})),
+            mt.Keyframe(knot=40 + knots, momentum=mt.Momentum(linear={"z": -80.0})),
+        )
+        return replace(mt.scenarios.jump(), keyframes=asked)
+
+    (finding,) = found(ironcub, thrown(10), "keyframe 2")
+    assert finding.severity is Severity.ERROR
+    assert "the momentum upwards has to fall by 160 kg m/s from keyframe 1, and gravity takes at most" in finding.found
+    assert found(ironcub, thrown(20), "keyframe 2") == []

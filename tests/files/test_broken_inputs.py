@@ -227,6 +227,21 @@ BROKEN = {
     "a box inside out": toml(
         "based_on = 'take-off'\n[[boxes]]\nlower = [1, 1, 1]\nupper = [0, 0, 0]", "finite numbers that rise"
     ),
+    "limits of nothing": toml(
+        "based_on = 'take-off'\n[[limits]]\nend = 0.5", "nothing is limited; expected base_speed"
+    ),
+    "a limit below zero": toml(
+        "based_on = 'take-off'\n[[limits]]\nthrusts.\"left arm\" = -1", "thrusts.left arm is -1", "at least zero"
+    ),
+    "a limit of a joint that is not there": toml(
+        "based_on = 'take-off'\n[[limits]]\njoint_speeds.tail = 1", "unknown joint or joint group 'tail'", error=None
+    ),
+    "a limit of a jet that is not there": toml(
+        "based_on = 'take-off'\n[[limits]]\nthrusts.tail = 1", "unknown jet 'tail'", error=None
+    ),
+    "limits that run backwards": toml(
+        "based_on = 'take-off'\n[[limits]]\nbase_speed = 1\nbegin = 0.6\nend = 0.2", "expected a begin before the end"
+    ),
     "half a scenario": toml("title = 'half'", "the scenario lacks", "'knots'"),
     # robots
     "a URDF elsewhere": robot('"ironcub.urdf"', '"../../ironcub.urdf"', "'urdf' is", "outside the robot's folder"),

@@ -230,3 +230,38 @@ def test_what_gives_way_names_what_was_given(dog):
     names = [term.name for term in relaxed.gives_way]
     assert names[0] == "given_off"
     assert set(names) <= {"given_off", "end: CoM", "touch_down", "joint_torques"}  # and no physics
+
+
+# ------------------------------------------------------------------------------------- gaits and their start guess
+
+
+@pytest.mark.parametrize(
+    ("kind", "swings"),
+    [
+        (mt.GaitKind.TROT, [{"FL", "HR"}, {"FR", "HL"}]),
+        (mt.GaitKind.BOUND, [{"FL", "FR"}, {"HL", "HR"}]),
+        (mt.GaitKind.JUMP, [set(LEGS)]),
+        (mt.GaitKind.WALK, [{"HL"}, {"FL"}, {"HR"}, {"FR"}]),
+    ],
+)
+def test_a_gait_lifts_its_feet_together_and_all_others_stand(dog, kind, swings):
+    plan = mt.GaitPlan(kind=kind, steps=len(swings), begin=0.2, end=0.8, clearance=0.02)
+    schedule = Schedule.of(dog, trot(dog, gait=plan))
+    together = [{LEGS[foot] for foot in np.flatnonzero(column)} for column in schedule.unloaded.T]
+    assert [feet for feet, before in zip(together[1:], together, strict=False) if feet and feet != before] == swings
+    assert not schedule.unloaded[:, 0].any()
+    assert (schedule.on | ~schedule.stands).all()
+
+
+def test_the_guess_of_a_flight_that_is_given_is_on_a_ballistic_arc(dog):
+    """Between lift-off and landing, t apart, the CoM rises by g t² / 8 over the straight way."""
+    leap = trot(dog, gait=mt.GaitPlan(kind=mt.GaitKind.JUMP, steps=1, begin=0.4, end=0.6, swing=1.0, clearance=0.0))
+    problem = mt.build(dog, leap)
+    guess = problem.layout.read_horizon(problem.guess * problem.scale)
+    height, step = guess["com_position"][2], leap.interval_max
+    air = np.flatnonzero(Schedule.of(dog, leap).in_air)
+    falls = np.diff(height[air], 2) / step**2
+    assert falls == pytest.approx(np.full(falls.size, -np.linalg.norm(dog.gravity)), rel=1e-6)
+    time = (air[-1] - air[0] + 1) * step
+    assert height.max() - height[0] == pytest.approx(np.linalg.norm(dog.gravity) * time**2 / 8, rel=0.02)
+    assert np.abs(guess["contact_forces"][:, air]).max() < 0.01 * dog.weight

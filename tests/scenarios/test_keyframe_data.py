@@ -18,6 +18,7 @@ from multimodal_to.scenarios import files as scenario_files
 from multimodal_to.scenarios.data import from_dict, to_dict, to_json
 from multimodal_to.scenarios.failures import failing_knots
 from multimodal_to.scenarios.keyframes import Placed, attitude_at
+from multimodal_to.scenarios.limits import limited
 from multimodal_to.trajectory import rules
 
 TURN = (0.0, 0.0, 1.0, 1.0)  # by a quarter to the left
@@ -260,6 +261,7 @@ pushes = [{ of = "chest", force = [0.0, 9.0, 0.0], end = "end" }]
 walls = [{ normal = [0.0, 0.0, -1.0], offset = -2.0, begin = "start", end = "start" }]
 boxes = [{ lower = [1.0, 1.0, 0.0], upper = [2.0, 2.0, 1.0], begin = "end" }]
 failures = [{ jet = "left arm", at = "start" }]
+limits = [{ base_speed = 1.0, begin = "start", end = "end" }]
 [[contacts]]
 of = "left"
 state = "on"
@@ -279,10 +281,14 @@ def test_every_place_that_takes_an_instant_reads_start_and_end(ironcub, tmp_path
     assert words.gait.stretches(ironcub) == shares.gait.stretches(ironcub)
     assert words.pushes[0].knots(10, rules.LEAPFROG) == shares.pushes[0].knots(10, rules.LEAPFROG) == range(10)
     assert failing_knots(words.failures, ironcub.jet_names, 10) == {0: 0}
+    assert limited(words.limits, ironcub, 10) == limited(shares.limits, ironcub, 10)
     assert scenario_files.load(scenario_files.save(words, tmp_path / "again.toml")) == words
 
 
-@pytest.mark.parametrize("key", ["gait.begin", "pushes.end", "walls.begin", "boxes.end", "failures.at", "contacts.end"])
+@pytest.mark.parametrize(
+    "key",
+    ["gait.begin", "pushes.end", "walls.begin", "boxes.end", "failures.at", "limits.begin", "contacts.end"],
+)
 def test_another_word_for_an_instant_is_refused_wherever_one_is_said(tmp_path, key):
     group, name = key.split(".")
     table = tomllib.loads(INSTANTS)

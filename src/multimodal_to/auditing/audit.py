@@ -17,6 +17,7 @@ from multimodal_to.auditing.contacts import contact_findings
 from multimodal_to.auditing.failures import failure_findings
 from multimodal_to.auditing.findings import Finding, Motion, Worst, largest, worst_of
 from multimodal_to.auditing.integrator import integrator_findings
+from multimodal_to.auditing.limits import limit_findings
 from multimodal_to.auditing.margins import margin_findings
 from multimodal_to.auditing.properties import GAPS, PROPERTIES, check_allowances
 from multimodal_to.auditing.regions import region_findings
@@ -139,6 +140,7 @@ def _of_all(motion: Motion, scenario: Scenario | None) -> tuple[Worst, ...]:
         *(contact_findings(motion, scenario) if scenario else ()),
         *(failure_findings(motion, scenario) if scenario else ()),
         *(region_findings(motion, scenario) if scenario else ()),
+        *(limit_findings(motion, scenario) if scenario else ()),
     )
 
 

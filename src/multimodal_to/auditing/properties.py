@@ -16,6 +16,7 @@ from multimodal_to.arguments import checked
 from multimodal_to.auditing import keyframes
 from multimodal_to.auditing.contacts import CONTACTS
 from multimodal_to.auditing.failures import FAILURES
+from multimodal_to.auditing.limits import LIMITS
 from multimodal_to.auditing.margins import MARGINS
 from multimodal_to.auditing.property import Judged, Of, Property
 from multimodal_to.auditing.regions import REGIONS
@@ -476,6 +477,7 @@ PROPERTIES: Mapping[str, Property] = FrozenMapping(
             *CONTACTS,
             *FAILURES,
             *REGIONS,
+            *LIMITS,
         )
     }
 )

@@ -32,6 +32,7 @@ class Judged(Enum):
     WITH_CONTACTS = "the scenario gives contacts"
     WITH_FAILURES = "the scenario lets jets fail"
     WITH_REGIONS = "the scenario has walls or boxes"
+    WITH_LIMITS = "the scenario has `limits`"
     STANDING_START = "the scenario starts standing"
     HOVERING_START = "the scenario starts in a hover"
     START_AT_REST = "the scenario starts standing or in a hover"
@@ -60,6 +61,7 @@ class Judged(Enum):
             Judged.WITH_CONTACTS: bool(scenario.contacts or scenario.gait),
             Judged.WITH_FAILURES: bool(scenario.failures),
             Judged.WITH_REGIONS: bool(scenario.walls or scenario.boxes),
+            Judged.WITH_LIMITS: bool(scenario.limits),
             Judged.STANDING_START: scenario.start is Start.STANDING,
             Judged.HOVERING_START: scenario.start is Start.HOVER,
             Judged.START_AT_REST: scenario.start is not Start.GIVEN,

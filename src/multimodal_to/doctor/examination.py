@@ -11,12 +11,14 @@ from multimodal_to.doctor.diagnosis import Diagnosis, Symptom, error
 from multimodal_to.doctor.formulation import formulation
 from multimodal_to.doctor.ground import height, hold
 from multimodal_to.doctor.hover import trim
+from multimodal_to.doctor.limits import limits
+from multimodal_to.doctor.posture import postures
 from multimodal_to.doctor.pushes import pushes
 from multimodal_to.doctor.reach import reach
 from multimodal_to.doctor.regions import regions, targets
 from multimodal_to.doctor.task import Task
 from multimodal_to.doctor.thrust import failures, spool_up_time, weight
-from multimodal_to.doctor.travel import leap, push, speed
+from multimodal_to.doctor.travel import base_way, leap, momenta, push, speed
 from multimodal_to.doctor.weighing import allowances, costs, groups, scales
 from multimodal_to.errors import InputError, MultimodalError, ScenarioError, TrajectoryError
 from multimodal_to.models.robot import Robot
@@ -35,6 +37,8 @@ CHECKS: tuple[Check, ...] = (
     failures,
     spool_up_time,
     speed,
+    base_way,
+    momenta,
     push,
     leap,
     height,
@@ -44,11 +48,12 @@ CHECKS: tuple[Check, ...] = (
     keyframes.joints,
     keyframes.turns,
     keyframes.stands,
-    keyframes.frames,
+    postures,
     keyframes.yaw_without_moment,
     contacts,
     regions,
     targets,
+    limits,
     pushes,
 )
 """What is asked of every task."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-import casadi as cs
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
@@ -14,14 +13,11 @@ from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
 from multimodal_to.doctor.task import Task
 from multimodal_to.errors import ScenarioError, apart
 from multimodal_to.models.joint_units import joint_units
-from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.models.units import Sized
 from multimodal_to.ocp import paper
 from multimodal_to.ocp.guess import standing_posture
-from multimodal_to.ocp.reaching import reached
-from multimodal_to.ocp.waypoints import com as com_path
-from multimodal_to.scenarios.keyframes import Placed, attitude_at, by_axis
+from multimodal_to.scenarios.keyframes import Placed, attitude_at
 
 _MISSED = Sized(1e-3, "m")
 """A frame that a search brings no nearer than this to where it is asked to be counts as out of reach."""
@@ -34,7 +30,7 @@ def joints(task: Task) -> Iterator[Symptom]:
     for index, name in enumerate(task.robot.joint_names):
         unit = joint_units(task.robot, "rad")[index]
         before = _first_joint(task, index)
-        for one in _in_order(task):
+        for one in task.held_in_order:
             if name not in one.keyframe.joints:
                 continue
             off, value = one.keyframe.joint_tolerance, one.keyframe.joints[name]
@@ -69,14 +65,15 @@ def _too_fast(task: Task, one: Placed, name: str, way: tuple[str, int, float]) -
     """
     label, knot, distance = way
     index = task.robot.joint_names.index(name)
-    time = (one.knot - knot) * task.scenario.interval_max
-    fastest = float(task.robot.joint_limits.speed[index])
+    fastest, time = float(task.robot.joint_limits.speed[index]), (one.knot - knot) * task.scenario.interval_max
+    furthest = task.furthest("joint_velocities", index, fastest, (knot, one.knot))
     unit = joint_units(task.robot, "rad")[index]
-    if distance > fastest * time + _OFF:
+    if distance > furthest + _OFF:
+        limits = " and `limits` are less" if furthest < fastest * time - _OFF else ""
         yield error(
             one.label,
-            f"{name} has to go {apart(distance, fastest * time)} {unit} from {label} in at most {time:.3g} s, and its "
-            f"greatest speed is {fastest:g} {unit}/s",
+            f"{name} has to go {apart(distance, furthest)} {unit} from {label} in at most {time:.3g} s, and its "
+            f"greatest speed is {fastest:g} {unit}/s{limits}",
             "ask for it at a later knot, or allow a longer interval_max",
         )
 
@@ -93,7 +90,7 @@ def turns(task: Task) -> Iterator[Symptom]:
         standing = task.start_posture.base_quaternion_xyzw if task.start_posture else robot.upright.base_quaternion_xyzw
         first = standing if task.stands_at_start else attitude_at(robot, scenario.placed(), 0)
         before = ("the start", 0, first)
-    for one in _in_order(task):
+    for one in task.held_in_order:
         keyframe = one.keyframe
         if not one.knot or (keyframe.yaw is None and keyframe.base_orientation is None):
             continue
@@ -102,12 +99,14 @@ def turns(task: Task) -> Iterator[Symptom]:
             label, knot, here = before
             angle = 2.0 * math.acos(min(abs(float(here @ there)), 1.0)) - keyframe.orientation_tolerance
             time = (one.knot - knot) * scenario.interval_max
-            if angle > fastest * time:
-                certain = angle > 1.8 * fastest * time and keyframe.hover
+            most = task.furthest("base_angular_velocity", 0, fastest, (knot, one.knot))
+            if angle > most:
+                certain = angle > 1.8 * most and keyframe.hover
+                limits = " and `limits` are less" if most < fastest * time - _OFF else ""
                 yield (error if certain else warning)(
                     one.label,
-                    f"the base has to turn by {apart(angle, fastest * time)} rad from {label} in at "
-                    f"most {time:.3g} s, and base_speed_max is {fastest:.3g} rad/s",
+                    f"the base has to turn by {apart(angle, most)} rad from {label} in at "
+                    f"most {time:.3g} s, and base_speed_max is {fastest:.3g} rad/s{limits}",
                     "ask for it at a later knot, allow a longer interval_max or more base_speed_max",
                 )
         before = (one.label, one.knot, there)
@@ -116,7 +115,7 @@ def turns(task: Task) -> Iterator[Symptom]:
 def stands(task: Task) -> Iterator[Symptom]:
     """Look for a posture for every keyframe that stands, with its CoM where it is asked to be."""
     scenario, robot = task.scenario, task.robot
-    for one in _in_order(task):
+    for one in task.held_in_order:
         com = one.keyframe.com
         if not one.keyframe.standing or one.knot in (0, scenario.knots) or not isinstance(com, tuple):
             continue
@@ -137,52 +136,6 @@ def stands(task: Task) -> Iterator[Symptom]:
             yield warning(one.label, str(cause), "ask for another CoM there")
 
 
-def frames(task: Task) -> Iterator[Symptom]:
-    """Bring frames to where they are asked to be, with the CoM and joints as asked, by inverse kinematics."""
-    for one in _in_order(task):
-        targets = {name: by_axis(target.position) for name, target in one.keyframe.frames.items() if target.position}
-        if not targets:
-            continue
-        com = by_axis(None if isinstance(one.keyframe.com, str) else one.keyframe.com)
-        for name, position in targets.items():
-            if len(position) == len(com) == 3:
-                away = math.dist(position.values(), com.values())
-                longest = _extent(task.robot, name)
-                if away > longest:
-                    yield error(
-                        one.label,
-                        f"{name} has to be {apart(away, longest)} m from the CoM, and the robot is at most "
-                        f"{longest:.3g} m long from there",
-                        "ask for a nearer point, or for another CoM",
-                    )
-                    return
-        found = reached(task.robot, one, com_path(task.scenario)[:, one.knot], task.robot.home, still=False)
-        for name, distance in (found.missed if found else {}).items():
-            if distance > _MISSED.of(task.robot.units) + one.keyframe.frames[name].position_tolerance:
-                where = "with the CoM where it is asked to be, " if com else ""
-                yield warning(
-                    one.label,
-                    f"{where}{name} was found to come no nearer than {distance:.3g} m to where it is asked to be",
-                    "ask for a nearer point, leave the CoM free there, or allow a position_tolerance",
-                )
-
-
-def _extent(robot: Robot, frame: str) -> float:
-    """Return a distance from a frame beyond which the CoM cannot be [m]: down to the base, and up to the farthest."""
-    tree = robot.kindyn.tree
-    slides = {joint.name: max(abs(joint.lower), abs(joint.upper)) for joint in tree.joints if joint.kind == "prismatic"}
-
-    def along(name: str) -> float:
-        place = tree.frames[name]
-        steps = [
-            float(cs.norm_2(tree.bodies[index].translation)) + slides.get(tree.bodies[index].joint or "", 0.0)
-            for index in tree.path(place.body)
-        ]
-        return sum(steps) + float(cs.norm_2(place.translation))
-
-    return along(frame) + max(along(name) for name in tree.frames)
-
-
 def yaw_without_moment(task: Task) -> Iterator[Symptom]:
     """Say where no force turns the robot about the vertical in the air: jets without drag on the base, all along it."""
     robot, tree = task.robot, task.robot.kindyn.tree
@@ -194,7 +147,7 @@ def yaw_without_moment(task: Task) -> Iterator[Symptom]:
         jet.drag for jet in robot.jets
     ):
         return
-    asked = [one.label for one in _in_order(task) if one.knot and one.keyframe.yaw]
+    asked = [one.label for one in task.held_in_order if one.knot and one.keyframe.yaw]
     found = "the jets all push along the vertical, and no force turns the robot about it while it is in the air"
     if asked and not task.stands_at_start:
         yield warning(asked[0], f"a yaw is asked for, and {found}", "ask for no yaw, or let a jet push aside")
@@ -203,9 +156,3 @@ def yaw_without_moment(task: Task) -> Iterator[Symptom]:
 
 
 _PARALLEL = 1e-6
-
-
-def _in_order(task: Task) -> list[Placed]:
-    """Return the keyframes that are held, by knot."""
-    held = [one for one in task.scenario.own_keyframes() if one.keyframe.weight is None]
-    return sorted(held, key=lambda one: one.knot)

@@ -20,6 +20,8 @@ from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.terms import Constraint
 from multimodal_to.ocp.waypoints import com as com_path
 from multimodal_to.scenarios.failures import failing_knots
+from multimodal_to.scenarios.keyframes import Placed
+from multimodal_to.scenarios.limits import Limited, limited
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 from multimodal_to.trajectory import rules
 
@@ -80,6 +82,12 @@ class Task:
         """Return whether the CoM stands still over the first interval: from rest and equilibrium, by leapfrog."""
         by_rest = self.scenario.start is not Start.GIVEN and bool(self.held(paper.STATIC_EQUILIBRIUM))
         return by_rest and bool(rules.instant(self.formulation.rule.name, "com_velocity"))
+
+    @cached_property
+    def held_in_order(self) -> list[Placed]:
+        """Return those of the scenario's `keyframes` that are held and no costs, by knot."""
+        held = [one for one in self.scenario.own_keyframes() if one.keyframe.weight is None]
+        return sorted(held, key=lambda one: one.knot)
 
     # ---------------------------------------------------------------- in the air
 
@@ -170,6 +178,40 @@ class Task:
     def held(self, *constraints: Constraint) -> tuple[Constraint, ...]:
         """Return those of some constraints that the formulation has."""
         return tuple(term for term in constraints if term in self.formulation.terms)
+
+    @cached_property
+    def _limited(self) -> tuple[Limited, ...]:
+        """Return what is limited over stretches; nothing where a limit is of what the robot has not."""
+        try:
+            return limited(self.scenario.limits, self.robot, self.scenario.knots)
+        except ScenarioError:
+            return ()
+
+    def greatest(self, quantity: str, row: int, usual: float) -> Array:
+        """Return how large a row of a quantity may be at each knot, (N + 1,).
+
+        Args:
+            quantity: of the trajectory.
+            row: of it.
+            usual: how large it may be without `limits`, in its unit.
+        """
+        most = np.full(self.scenario.knots + 1, float(usual))
+        for one in self._limited:
+            if (one.quantity, one.row) == (quantity, row):
+                most[list(one.knots)] = np.minimum(most[list(one.knots)], one.most)
+        return most
+
+    def furthest(self, quantity: str, row: int, usual: float, between: tuple[int, int]) -> float:
+        """Return how far something with a row of a velocity comes between two knots at most.
+
+        Args:
+            quantity: of the trajectory, a velocity.
+            row: of it.
+            usual: its greatest size without `limits`, in its unit.
+            between: the knots.
+        """
+        first, last = between
+        return float(self.greatest(quantity, row, usual)[first + 1 : last + 1].sum()) * self.scenario.interval_max
 
     @property
     def rigid(self) -> bool:

@@ -14,6 +14,7 @@ from multimodal_to.models.terrain import FlatGround
 from multimodal_to.scenarios.keyframes import AXES
 from multimodal_to.scenarios.scenario import Terminal
 
+_ROUNDING = 1e-9
 _FEWEST = 4
 """Intervals below which a flight is followed badly [1]."""
 _LIMBS = 0.25
@@ -25,48 +26,114 @@ def speed(task: Task) -> Iterator[Symptom]:
     scenario = task.scenario
     fastest, _ = scenario.base_speeds(task.robot)
 
-    def furthest(intervals: int) -> float:
-        return intervals * scenario.interval_max * fastest
+    def furthest(first: int, last: int) -> float:
+        return task.furthest("base_linear_velocity", 0, fastest, (first, last))
 
     start, end = np.array(scenario.start_com), np.array(scenario.end_com)
-    stretches = [("from start to end", float(np.abs(end - start).max()), task.moving_intervals)]
+    stretches = [("from start to end", float(np.abs(end - start).max()), 0, task.moving_intervals)]
     if scenario.mid_height_min is not None:
         middle = scenario.knots // 2
         stretches += [
-            ("up to mid_height_min", scenario.mid_height_min - start[2], middle),
-            ("down from mid_height_min", scenario.mid_height_min - end[2], task.moving_intervals - middle),
+            ("up to mid_height_min", scenario.mid_height_min - start[2], 0, middle),
+            ("down from mid_height_min", scenario.mid_height_min - end[2], middle, task.moving_intervals),
         ]
-    stretches += _between_keyframes(task)
-    label, distance, intervals = max(stretches, key=lambda stretch: stretch[1] - furthest(stretch[2]))
-    if distance <= furthest(intervals):
+    stretches += _between_keyframes(task, "CoM")
+    label, distance, first, last = max(stretches, key=lambda stretch: stretch[1] - furthest(*stretch[2:]))
+    most, intervals = furthest(first, last), last - first
+    if distance <= most:
         return
-    certain = distance - _LIMBS * task.robot.contact_reach[2] > furthest(intervals + 1) or intervals <= 0
+    usual = scenario.interval_max * fastest
+    certain = distance - _LIMBS * task.robot.contact_reach[2] > most + usual or intervals <= 0
+    limits = " and `limits` are less" if most < intervals * usual - _ROUNDING else ""
     yield (error if certain else warning)(
         "time for the distance",
-        f"the CoM has to go {apart(distance, furthest(intervals))} m {label} in at most "
+        f"the CoM has to go {apart(distance, most)} m {label} in at most "
         f"{intervals * scenario.interval_max:.4g} s ({intervals} intervals in which it can move), and "
-        f"base_speed_max is {fastest:.3g} m/s",
+        f"base_speed_max is {fastest:.3g} m/s{limits}",
         "allow more knots, a longer interval_max or more speed",
     )
 
 
-def _between_keyframes(task: Task) -> list[tuple[str, float, int]]:
-    """Return each stretch that the CoM has to go along an axis between two keyframes: label, way [m], intervals."""
+def _between_keyframes(task: Task, what: str) -> list[tuple[str, float, int, int]]:
+    """Return each stretch that something has to go along an axis between keyframes: label, way [m], first, last knot.
+
+    Between these knots it can move.
+
+    Args:
+        task: robot and scenario.
+        what: goes there, as `Keyframe.limits` calls it, without its axis.
+    """
     stretches = []
     for axis in AXES:
         known: tuple[str, int, float, float] | None = None
         for one in sorted(task.scenario.placed(), key=lambda some: some.knot):
-            asked = [limits[1:] for limits in one.keyframe.limits() if limits[0] == f"CoM {axis} [m]"]
+            asked = [limits[1:] for limits in one.keyframe.limits() if limits[0] == f"{what} {axis} [m]"]
             if one.keyframe.weight is not None or not asked or one.label == "middle":
                 continue
             low, high = max(least for least, _ in asked), min(most for _, most in asked)
             if known is not None and one.knot > known[1] and {one.label, known[0]} != {"start", "end"}:
-                way, intervals = max(low - known[3], known[2] - high, 0.0), one.knot - known[1]
-                intervals -= known[0] == "start" and task.rests_first
-                intervals -= task.scenario.knots - task.moving_intervals if one.label == "end" else 0
-                stretches.append((f"along {axis} from {known[0]} to {one.label}", way, intervals))
+                first = known[1] + (known[0] == "start" and task.rests_first)
+                last = task.moving_intervals if one.label == "end" else one.knot
+                way = max(low - known[3], known[2] - high, 0.0)
+                stretches.append((f"along {axis} from {known[0]} to {one.label}", way, first, last))
             known = one.label, one.knot, low, high
     return stretches
+
+
+def base_way(task: Task) -> Iterator[Symptom]:
+    """Compare the ways of the base between keyframes that place it with its greatest speed."""
+    fastest, _ = task.scenario.base_speeds(task.robot)
+    for label, way, first, last in _between_keyframes(task, "base position"):
+        most = task.furthest("base_linear_velocity", 0, fastest, (first, last))
+        if way > most + _ROUNDING:
+            limits = " and `limits` are less" if most < (last - first) * task.scenario.interval_max * fastest else ""
+            yield error(
+                "time for the distance",
+                f"the base has to go {apart(way, most)} m {label} in at most "
+                f"{(last - first) * task.scenario.interval_max:.4g} s, and base_speed_max is {fastest:.3g} m/s{limits}",
+                "allow more knots, a longer interval_max or more speed",
+            )
+
+
+def momenta(task: Task) -> Iterator[Symptom]:
+    """Compare momenta with the greatest speed, and a momentum that is lost on the way with what gravity takes.
+
+    Nothing but gravity pushes down where there are no jets and no known pushes: m g T in the time T.
+    """
+    scenario, robot = task.scenario, task.robot
+    fastest, _ = scenario.base_speeds(robot)
+    for one in task.held_in_order:
+        for what, least, most in one.keyframe.limits():
+            if what.startswith("linear momentum") and (speed := max(abs(least), abs(most)) / robot.mass) > fastest:
+                yield warning(
+                    one.label,
+                    f"{what.removesuffix(' [kg m/s]')} asks the CoM to go at {apart(speed, fastest)} m/s, and "
+                    f"base_speed_max is {fastest:.3g} m/s",
+                    "ask for less, or allow more base_speed_max",
+                )
+    if not (robot.jets or scenario.pushes):
+        yield from _lost(task)
+
+
+def _lost(task: Task) -> Iterator[Symptom]:
+    """Compare what is lost of the momentum upwards between two keyframes with what gravity takes in the time."""
+    before: tuple[str, int, float] | None = None
+    for one in sorted(task.scenario.placed(), key=lambda some: some.knot):
+        asked = [limits[1:] for limits in one.keyframe.limits() if limits[0] == "linear momentum z [kg m/s]"]
+        if one.keyframe.weight is not None or not asked:
+            continue
+        low, high = max(least for least, _ in asked), min(most for _, most in asked)
+        if before is not None:
+            label, knot, there = before
+            taken = task.robot.weight * (one.knot - knot + 1) * task.scenario.interval_max
+            if there - high > taken:
+                yield error(
+                    one.label,
+                    f"the momentum upwards has to fall by {apart(there - high, taken)} kg m/s from {label}, and "
+                    f"gravity takes at most {apart(taken, there - high)} kg m/s in the time",
+                    "ask for it at a later knot, or allow a longer interval_max",
+                )
+        before = one.label, one.knot, low
 
 
 def push(task: Task) -> Iterator[Symptom]:

@@ -15,6 +15,7 @@ from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.stages import Held, NamedStage, collect
 from multimodal_to.ocp.variables import Bounds, Layout, ranges
 from multimodal_to.scenarios.failures import failing_knots
+from multimodal_to.scenarios.limits import limited
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 
 
@@ -129,6 +130,7 @@ def prepared(robot: Robot, scenario: Scenario) -> tuple[Robot, Posture]:
     if not robot.contacts and (scenario.start is Start.STANDING or scenario.terminal is Terminal.STANDING):
         raise ScenarioError(f"{robot.name} has no contact points to stand on")
     failing_knots(scenario.failures, robot.jet_names, scenario.knots)  # which refuses a jet that is not there
+    limited(scenario.limits, robot, scenario.knots)  # likewise
     for group in scenario.weights.joint_velocities:
         robot.group_indices(group)
     return robot, _standing(robot, scenario)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.contact import FACES
 from multimodal_to.models.units import ONE, ONE_OF_A_POINT, OwnSize
-from multimodal_to.ocp import constraints, contacts, costs, failures, pushes, regions
+from multimodal_to.ocp import constraints, contacts, costs, failures, limits, pushes, regions
 from multimodal_to.ocp.contacts import ON_GROUND
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.schedule import Flags
@@ -114,6 +114,7 @@ def _pushed_labels(parameters: Parameters) -> tuple[str, ...]:
 
 
 def _pushed_units(parameters: Parameters) -> tuple[str, ...]:
+    """m/s, kg m²/s."""
     return ("m/s", "m/s", "m/s", "kg m²/s", "kg m²/s", "kg m²/s") * len(pushes.groups(parameters))
 
 
@@ -402,6 +403,7 @@ CONSTRAINTS = (
     *failures.CONSTRAINTS,
     MOMENTUM_DYNAMICS_PUSHED,
     regions.ROOM,
+    limits.LIMITS,
 )
 
 # -------------------------------------------------------------------- costs

@@ -15,6 +15,7 @@ from multimodal_to.scenarios.contacts import ContactState, ContactStretch
 from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitKind, GaitPlan
 from multimodal_to.scenarios.keyframes import FrameTarget, Keyframe, Momentum
+from multimodal_to.scenarios.limits import Limits
 from multimodal_to.scenarios.regions import Box, Wall
 from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
 from multimodal_to.trajectory.pushes import KnownPush
@@ -30,6 +31,7 @@ __all__ = [
     "JetFailure",
     "Keyframe",
     "KnownPush",
+    "Limits",
     "Margins",
     "Momentum",
     "Scenario",

@@ -27,6 +27,7 @@ from multimodal_to.scenarios.keyframes import (
     by_axis,
     contradiction,
 )
+from multimodal_to.scenarios.limits import Limits
 from multimodal_to.scenarios.regions import Box, Wall
 from multimodal_to.trajectory.instants import END, START
 from multimodal_to.trajectory.pushes import KnownPush
@@ -242,12 +243,14 @@ class Scenario:
     """Half-spaces that the robot stays in."""
     boxes: tuple[Box, ...] = ()
     """Boxes that the robot keeps out of, or stays in."""
+    limits: tuple[Limits, ...] = ()
+    """Speeds and thrusts that are limited over stretches, tighter than by the robot and by `base_speed_max`."""
 
     def __post_init__(self) -> None:
         check_fields(self, ScenarioError)
         object.__setattr__(self, "allowances", FrozenMapping(self.allowances))
         object.__setattr__(self, "keyframes", tuple(self.keyframes))
-        for label in ("contacts", "failures", "pushes", "walls", "boxes"):
+        for label in ("contacts", "failures", "pushes", "walls", "boxes", "limits"):
             object.__setattr__(self, label, tuple(getattr(self, label)))
         self._check_name()
         self._check_numbers()

@@ -15,7 +15,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, unknown
 from multimodal_to.native.stage_solver import KktStructure
-from multimodal_to.ocp import contacts, failures, keyframes, margins, paper, regions
+from multimodal_to.ocp import contacts, failures, keyframes, limits, margins, paper, regions
 from multimodal_to.ocp.problem import Problem
 from multimodal_to.solving import linear_solvers, machine, stages
 from multimodal_to.solving.ipopt import Ipopt, Pass
@@ -59,8 +59,9 @@ def relax(
     Minimises Σ w (s⁺ + s⁻) + ½ κ |x − x₀|² subject to the bounds of x, s⁺, s⁻ ≥ 0 and the terms' bounds on
     g(x) + s⁺ − s⁻, in solver units. The sum of absolute values (l1) puts what has to give way on few rows; κ is small.
     What is asked of the motion has w = 1: keyframes, feet that are given to be off and their clearance, walls, boxes,
-    jets that fail, reach, margins and terms of one's own. Physics has `physics`: where that is large, it gives way only
-    where no other row can. With 1 all rows are alike, and a motion that meets all of them is found more surely.
+    jets that fail, limits over stretches, reach, margins and terms of one's own. Physics has `physics`: where that is
+    large, it gives way only where no other row can. With 1 all rows are alike, and a motion that meets all of them is
+    found more surely.
 
     Args:
         problem: from `build`.
@@ -156,7 +157,7 @@ def asked_terms(problem: Problem) -> set[str]:
     """Return the names of the terms that are no physics: what the task asks for, and how far its plan keeps away."""
     keyframe_terms = keyframes.terms(problem.robot, problem.scenario, problem.formulation.rule.name)
     reach = (paper.CONTACT_REACH, paper.JET_REACH, paper.UPRIGHT_FIRST, paper.UPRIGHT_LAST)
-    given = (contacts.GIVEN_OFF, contacts.CLEARANCE, regions.ROOM, *failures.CONSTRAINTS)
+    given = (contacts.GIVEN_OFF, contacts.CLEARANCE, regions.ROOM, limits.LIMITS, *failures.CONSTRAINTS)
     names = {term.name for term in (*keyframe_terms, *reach, *margins.CONSTRAINTS, *given)}
     return names | set(problem.formulation.own_terms)
 
