@@ -160,7 +160,7 @@ def jump() -> Scenario:
             contact_forces=1.0,
             base_orientation=2e7,
             skimming=4e7,
-            final_posture=3e7,  # 1e5 in the paper
+            final_posture=4e7,  # 1e5 in the paper
         ),
     )
 
