@@ -71,7 +71,10 @@ COMMANDS = {
     "audit, json": ["audit", "motion.npz", "--robot", "robot", "--json"],
     "audit, kinematic": ["audit", "motion.npz", "--robot", "robot", "--kinematic"],
     "simulate": ["simulate", "motion.npz", "--robot", "robot"],
-    "simulate, plain": ["simulate", "motion.npz", "--robot", "robot", "--no-torque-limits", "-o", "plain.npz"],
+    "simulate, plain": [
+        *("simulate", "motion.npz", "--robot", "robot", "--controller", "whole-body", "--no-torque-limits"),
+        *("-o", "plain.npz"),
+    ],
     "simulate, trials": [
         *("simulate", "motion.npz", "--robot", "robot", "--trials", "1", "--seed", "2", "--jobs", "1", "--push", "1"),
         *("--noise", "--json", "--film", "film.html"),
