@@ -35,7 +35,8 @@ def postures(task: Task) -> Iterator[Symptom]:
     for one in task.held_in_order:
         certain = [*_too_long(task.robot, one), *_base_off_com(task.robot, one)]
         yield from certain[:1]
-        if certain or not _asks_for_several(one.keyframe) or (task.stands_at_start and not one.knot):
+        sought = _asks_for_several(one.keyframe) and not (one.keyframe.hover and not task.lifts)
+        if certain or not sought or (task.stands_at_start and not one.knot):
             continue
         if missed := _missed(task, one):
             yield warning(

@@ -29,6 +29,11 @@ GIVES_WAY = 1e-4
 """What a row has to give way by to be named, in solver units: 0.1 mm, 5e-3 N."""
 PHYSICS = 100.0
 """How much more it costs that a row of physics gives way than one of the task."""
+GIVEN = 0.02
+"""What it costs that a foot bears load where it is given to be off; the rest of what is asked costs 1.
+
+A keyframe is missed once, and by little. Such feet bear the whole weight, at many knots.
+"""
 _NEARNESS = 1e-5
 """What half the squared distance from the start costs, in solver units: little enough to move no row's price."""
 
@@ -58,10 +63,10 @@ def relax(
 
     Minimises Σ w (s⁺ + s⁻) + ½ κ |x − x₀|² subject to the bounds of x, s⁺, s⁻ ≥ 0 and the terms' bounds on
     g(x) + s⁺ − s⁻, in solver units. The sum of absolute values (l1) puts what has to give way on few rows; κ is small.
-    What is asked of the motion has w = 1: keyframes, feet that are given to be off and their clearance, walls, boxes,
+    What is asked of the motion has w = 1: keyframes, the clearance of feet that are given to be off, walls, boxes,
     jets that fail, limits over stretches, reach, margins and terms of one's own. Physics has `physics`: where that is
     large, it gives way only where no other row can. With 1 all rows are alike, and a motion that meets all of them is
-    found more surely.
+    found more surely. Load of feet that are given to be off has `GIVEN`.
 
     Args:
         problem: from `build`.
@@ -133,8 +138,9 @@ class _Elastic:
         prices = np.full(count + first, physics)
         for name in terms:
             if name in asked:
-                prices[problem.rows[name].index if name in problem.rows else []] = 1.0
-                prices[count:][places.get(name, slice(0))] = 1.0
+                price = GIVEN if name == contacts.GIVEN_OFF.name else 1.0
+                prices[problem.rows[name].index if name in problem.rows else []] = price
+                prices[count:][places.get(name, slice(0))] = price
         rows = [problem.rows[name].index for name in terms if name in problem.rows]
         chosen = np.sort(np.concatenate([*rows, count + np.arange(first)])).astype(np.int64)
         return cls(
