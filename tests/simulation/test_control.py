@@ -126,6 +126,9 @@ def test_draws_stay_within_what_the_documentation_says(ironcub):
         assert np.linalg.norm(one.push.force) == pytest.approx(0.114 * ironcub.weight)
         assert one.push.force[2] == 0.0
         assert 0.0 <= one.push.start <= 6.8
+        late = draw(ironcub, 7.0, np.random.default_rng(seed), push_starts=(3.0, 4.0))
+        assert 3.0 <= late.push.start <= 4.0
+        assert replace(late, push=one.push) == one
 
 
 def test_a_draw_of_no_number_is_refused():
@@ -133,6 +136,9 @@ def test_a_draw_of_no_number_is_refused():
         Disturbance(friction=-1.0)
     with pytest.raises(InputError, match=r"a push of at least zero"):
         Draws(push=-1.0)
+    for starts in ((2.0, 1.0), (0.0, np.inf), (0.0,)):
+        with pytest.raises(InputError, match=r"two finite numbers that do not fall"):
+            Draws(push_starts=starts)
 
 
 def test_drawn_gains_are_each_within_their_spread():

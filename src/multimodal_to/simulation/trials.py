@@ -91,7 +91,8 @@ class Draws:
     def __post_init__(self) -> None:
         if self.seed < 0 or not (self.push is None or 0.0 <= self.push < np.inf):
             raise InputError(f"the draws are {self}; expected a seed and a push of at least zero")
-        if self.push_starts is not None and not -np.inf < self.push_starts[0] <= self.push_starts[1] < np.inf:
+        starts = self.push_starts
+        if starts is not None and not (len(starts) == 2 and -np.inf < starts[0] <= starts[1] < np.inf):
             raise InputError(f"the draws are {self}; expected push_starts as two finite numbers that do not fall")
 
 
@@ -164,7 +165,7 @@ def run_trials(
         jobs: how many run at once, each in a process of its own.
 
     Raises:
-        OutputError: a process of the trials was ended from outside, as where memory is short.
+        OutputError: a process of the trials ended before its trial did.
     """
     if jobs <= 1 or len(numbers) <= 1:
         for number in numbers:
@@ -188,7 +189,8 @@ def run_trials(
                 yield done
     except (EOFError, BrokenPipeError, ConnectionResetError) as error:
         raise OutputError(
-            f"a process of the trials was ended from outside, as where memory is short; {len(started)} ran at once"
+            "a process of the trials ended before its trial did: memory may be short for so many at once, or a script "
+            "lacks `if __name__ == '__main__':` around the call"
         ) from error
     finally:
         for pipe, process in started:
