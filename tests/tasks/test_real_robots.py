@@ -125,6 +125,12 @@ def test_a_hopper_on_one_leg_hops_by_25_cm(tmp_path):
     )
 
 
+@pytest.mark.parametrize("name", list(mt.scenarios.SCENARIOS))
+def test_the_third_iron_cub_does_the_bundled_scenarios_in_its_own_units(name):
+    mk3 = mt.load_robot("ironcub-mk3")
+    solved(mk3, mt.tasks.find(name, mk3))
+
+
 @pytest.mark.parametrize("task", ["hover", "take-off", "land"])
 def test_a_drone_without_joints_flies(task):
     """It was refused, and needed five empty tables to be so."""
