@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import multimodal_to as mt
+from commands import run
 from hopper import heading
 from multimodal_to.models.attitude import product, tilt
 from multimodal_to.ocp.schedule import Schedule
@@ -124,6 +125,12 @@ def test_a_hopper_on_one_leg_hops_by_25_cm(tmp_path):
     )
 
 
+@pytest.mark.parametrize("name", list(mt.scenarios.SCENARIOS))
+def test_the_third_iron_cub_does_the_bundled_scenarios_in_its_own_units(name):
+    mk3 = mt.load_robot("ironcub-mk3")
+    solved(mk3, mt.tasks.find(name, mk3))
+
+
 @pytest.mark.parametrize("task", ["hover", "take-off", "land"])
 def test_a_drone_without_joints_flies(task):
     """It was refused, and needed five empty tables to be so."""
@@ -151,3 +158,11 @@ def test_the_take_off_of_a_robot_that_heads_elsewhere_is_the_same(ironcub):
         assert solution.status.solved
         objectives.append(solution.objective)
     assert objectives[1] == pytest.approx(objectives[0], rel=2e-2)
+
+
+def test_a_starter_task_is_gone_on_from_by_its_name(tmp_path):
+    folder = tmp_path / "squat"
+    first = run("solve", "squat", "--robot", "solo12", "-o", folder, "--max-iterations", 3, "--no-pictures")
+    assert first.returncode == 1
+    again = run("solve", "--resume", folder / "trajectory.npz", "squat", "--no-pictures")
+    assert again.returncode == 0, again.stdout + again.stderr
