@@ -35,7 +35,7 @@ class BalanceGains:
     """The numbers of the stabiliser, in the robot's own units: m, g and L, the height of its CoM at home."""
 
     com_stiffness: float = 1.5  # K_x [g/L]; below 1 it does not hold an inverted pendulum
-    com_damping: float = 1.6  # D_x [√(g/L)]
+    com_damping: float = 1.35  # D_x [√(g/L)]; at 1.9 a stiff robot chatters on its feet
     attitude_stiffness: float = 0.94  # K_R [g/L]
     attitude_damping: float = 1.94  # D_h [√(g/L)]
     load_spread: float = 0.5  # σ of a contact force, as a share of the planned load of its point [1]
