@@ -144,7 +144,8 @@ def test_a_hover_on_the_way_asks_for_time_to_spool_up(hopper):
 
 def test_a_jump_at_a_keyframe_needs_time_speed_and_short_intervals(ironcub):
     def jump(height, knot=50, **changes):
-        task = replace(mt.scenarios.jump(), mid_height_min=None, **changes)
+        steps = {"knots": 100, "interval_min": 0.02, "interval_max": 0.02, "mid_height_min": None}
+        task = replace(mt.scenarios.jump(), **steps | changes)
         return replace(task, keyframes=(mt.Keyframe(knot=knot, com_min={"z": height}),))
 
     assert found(ironcub, jump(0.65), "leap") == []
@@ -202,7 +203,7 @@ def test_a_momentum_that_gravity_cannot_take_in_time_is_refused(ironcub):
             mt.Keyframe(knot=40, momentum=mt.Momentum(linear={"z": 80.0})),
             mt.Keyframe(knot=40 + knots, momentum=mt.Momentum(linear={"z": -80.0})),
         )
-        return replace(mt.scenarios.jump(), keyframes=asked)
+        return replace(mt.scenarios.jump(), interval_min=0.02, interval_max=0.02, keyframes=asked)
 
     (finding,) = found(ironcub, thrown(10), "keyframe 2")
     assert finding.severity is Severity.ERROR
