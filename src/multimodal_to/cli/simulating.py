@@ -166,14 +166,19 @@ class _Log:
 
     def trials(self) -> dict[int, Trial]:
         """Return the trials of these settings by their numbers."""
-        return {trial.number: trial for run in self._runs() for trial in run["trials"] if self._is_own(run)}
+        return self._own(self._runs())
 
     def add(self, trial: Trial) -> None:
         """Keep a trial; the file is read again, since another command may have written to it."""
-        runs, own = [run for run in self._runs() if not self._is_own(run)], self.trials() | {trial.number: trial}
+        kept = self._runs()
+        own = self._own(kept) | {trial.number: trial}
+        runs = [run for run in kept if not self._is_own(run)]
         runs.append({"settings": self.settings, "trials": [own[number] for number in sorted(own)]})
         plain = [run | {"trials": [asdict(one) for one in run["trials"]]} for run in runs]
         write_text(self.path, json.dumps({"runs": plain}, indent=1))
+
+    def _own(self, runs: Sequence[Mapping[str, Any]]) -> dict[int, Trial]:
+        return {trial.number: trial for run in runs for trial in run["trials"] if self._is_own(run)}
 
     def _is_own(self, run: Mapping[str, Any]) -> bool:
         return bool(run["settings"] == self.settings)

@@ -10,17 +10,14 @@ import numpy as np
 from multimodal_to.adam.spatial import Array
 from multimodal_to.adam.tree import BASE
 from multimodal_to.doctor.diagnosis import Symptom, error, note, warning
-from multimodal_to.doctor.task import Task
+from multimodal_to.doctor.task import Task, narrowed
 from multimodal_to.errors import ScenarioError, apart
 from multimodal_to.models.joint_units import joint_units
 from multimodal_to.models.terrain import FlatGround
-from multimodal_to.models.units import Sized
 from multimodal_to.ocp import paper
 from multimodal_to.ocp.guess import standing_posture
 from multimodal_to.scenarios.keyframes import Placed, attitude_at
 
-_MISSED = Sized(1e-3, "m")
-"""A frame that a search brings no nearer than this to where it is asked to be counts as out of reach."""
 _OFF = 1e-9
 
 
@@ -69,11 +66,10 @@ def _too_fast(task: Task, one: Placed, name: str, way: tuple[str, int, float]) -
     furthest = task.furthest("joint_velocities", index, fastest, (knot, one.knot))
     unit = joint_units(task.robot, "rad")[index]
     if distance > furthest + _OFF:
-        limits = " and `limits` are less" if furthest < fastest * time - _OFF else ""
         yield error(
             one.label,
             f"{name} has to go {apart(distance, furthest)} {unit} from {label} in at most {time:.3g} s, and its "
-            f"greatest speed is {fastest:g} {unit}/s{limits}",
+            f"greatest speed is {fastest:g} {unit}/s{narrowed(furthest, fastest * time)}",
             "ask for it at a later knot, or allow a longer interval_max",
         )
 
@@ -102,11 +98,10 @@ def turns(task: Task) -> Iterator[Symptom]:
             most = task.furthest("base_angular_velocity", 0, fastest, (knot, one.knot))
             if angle > most:
                 certain = angle > 1.8 * most and keyframe.hover
-                limits = " and `limits` are less" if most < fastest * time - _OFF else ""
                 yield (error if certain else warning)(
                     one.label,
                     f"the base has to turn by {apart(angle, most)} rad from {label} in at "
-                    f"most {time:.3g} s, and base_speed_max is {fastest:.3g} rad/s{limits}",
+                    f"most {time:.3g} s, and base_speed_max is {fastest:.3g} rad/s{narrowed(most, fastest * time)}",
                     "ask for it at a later knot, allow a longer interval_max or more base_speed_max",
                 )
         before = (one.label, one.knot, there)

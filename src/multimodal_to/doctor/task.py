@@ -25,6 +25,8 @@ from multimodal_to.scenarios.limits import Limited, limited
 from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Vector3
 from multimodal_to.trajectory import rules
 
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Task:
@@ -217,3 +219,13 @@ class Task:
     def rigid(self) -> bool:
         """Return whether no joint can move."""
         return not np.any(self.robot.joint_limits.lower < self.robot.joint_limits.upper)
+
+
+def narrowed(most: float, usual: float) -> str:
+    """Return what a finding adds where `limits` of the scenario allow less than is usual; else nothing.
+
+    Args:
+        most: that is allowed, with `limits`.
+        usual: that is allowed without them, in the same unit.
+    """
+    return " and `limits` are less" if most < usual - _ROUNDING else ""

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from multimodal_to.doctor.diagnosis import Symptom, error, warning
-from multimodal_to.doctor.task import Task
+from multimodal_to.doctor.task import Task, narrowed
 from multimodal_to.errors import apart
 from multimodal_to.models.terrain import FlatGround
-from multimodal_to.scenarios.keyframes import AXES
+from multimodal_to.scenarios.keyframes import AXES, Placed
 from multimodal_to.scenarios.scenario import Terminal
 
 _ROUNDING = 1e-9
@@ -44,12 +44,11 @@ def speed(task: Task) -> Iterator[Symptom]:
         return
     usual = scenario.interval_max * fastest
     certain = distance - _LIMBS * task.robot.contact_reach[2] > most + usual or intervals <= 0
-    limits = " and `limits` are less" if most < intervals * usual - _ROUNDING else ""
     yield (error if certain else warning)(
         "time for the distance",
         f"the CoM has to go {apart(distance, most)} m {label} in at most "
         f"{intervals * scenario.interval_max:.4g} s ({intervals} intervals in which it can move), and "
-        f"base_speed_max is {fastest:.3g} m/s{limits}",
+        f"base_speed_max is {fastest:.3g} m/s{narrowed(most, intervals * usual)}",
         "allow more knots, a longer interval_max or more speed",
     )
 
@@ -66,11 +65,9 @@ def _between_keyframes(task: Task, what: str) -> list[tuple[str, float, int, int
     stretches = []
     for axis in AXES:
         known: tuple[str, int, float, float] | None = None
-        for one in sorted(task.scenario.placed(), key=lambda some: some.knot):
-            asked = [limits[1:] for limits in one.keyframe.limits() if limits[0] == f"{what} {axis} [m]"]
-            if one.keyframe.weight is not None or not asked or one.label == "middle":
+        for one, low, high in _held(task, f"{what} {axis} [m]"):
+            if one.label == "middle":
                 continue
-            low, high = max(least for least, _ in asked), min(most for _, most in asked)
             if known is not None and one.knot > known[1] and {one.label, known[0]} != {"start", "end"}:
                 first = known[1] + (known[0] == "start" and task.rests_first)
                 last = task.moving_intervals if one.label == "end" else one.knot
@@ -80,17 +77,30 @@ def _between_keyframes(task: Task, what: str) -> list[tuple[str, float, int, int
     return stretches
 
 
+def _held(task: Task, what: str) -> Iterator[tuple[Placed, float, float]]:
+    """Yield the keyframes that hold a quantity within a range, by knot, with its least and its greatest value.
+
+    Args:
+        task: robot and scenario.
+        what: is held, as `Keyframe.limits` calls it.
+    """
+    for one in sorted(task.scenario.placed(), key=lambda some: some.knot):
+        asked = [limits[1:] for limits in one.keyframe.limits() if limits[0] == what]
+        if one.keyframe.weight is None and asked:
+            yield one, max(least for least, _ in asked), min(most for _, most in asked)
+
+
 def base_way(task: Task) -> Iterator[Symptom]:
     """Compare the ways of the base between keyframes that place it with its greatest speed."""
     fastest, _ = task.scenario.base_speeds(task.robot)
     for label, way, first, last in _between_keyframes(task, "base position"):
         most = task.furthest("base_linear_velocity", 0, fastest, (first, last))
         if way > most + _ROUNDING:
-            limits = " and `limits` are less" if most < (last - first) * task.scenario.interval_max * fastest else ""
+            time = (last - first) * task.scenario.interval_max
             yield error(
                 "time for the distance",
                 f"the base has to go {apart(way, most)} m {label} in at most "
-                f"{(last - first) * task.scenario.interval_max:.4g} s, and base_speed_max is {fastest:.3g} m/s{limits}",
+                f"{time:.4g} s, and base_speed_max is {fastest:.3g} m/s{narrowed(most, time * fastest)}",
                 "allow more knots, a longer interval_max or more speed",
             )
 
@@ -118,11 +128,7 @@ def momenta(task: Task) -> Iterator[Symptom]:
 def _lost(task: Task) -> Iterator[Symptom]:
     """Compare what is lost of the momentum upwards between two keyframes with what gravity takes in the time."""
     before: tuple[str, int, float] | None = None
-    for one in sorted(task.scenario.placed(), key=lambda some: some.knot):
-        asked = [limits[1:] for limits in one.keyframe.limits() if limits[0] == "linear momentum z [kg m/s]"]
-        if one.keyframe.weight is not None or not asked:
-            continue
-        low, high = max(least for least, _ in asked), min(most for _, most in asked)
+    for one, low, high in _held(task, "linear momentum z [kg m/s]"):
         if before is not None:
             label, knot, there = before
             taken = task.robot.weight * (one.knot - knot + 1) * task.scenario.interval_max

@@ -11,6 +11,7 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.simulation.controller import Belief
 from multimodal_to.simulation.model import mujoco_module
 from multimodal_to.simulation.reference import Reference
+from multimodal_to.simulation.stabiliser import touching
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,7 +76,7 @@ class PlannedFeet:
             step: row of the plan.
         """
         simulation, data = belief.simulation, belief.data
-        touches, away, total = np.isin(simulation.points, data.contact.geom), np.zeros(3), 0.0
+        touches, away, total = touching(simulation, data), np.zeros(3), 0.0
         for foot, own in enumerate(self.members):
             load = float(self.load[foot, step])
             if load > 0.0 and touches[own].any():

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.units import Units
@@ -81,7 +82,7 @@ def correct(
     loads = np.maximum(plan.contact_forces[step][:, 2], 0.0)
     feet = np.array([contact.foot for contact in robot.contacts], dtype=np.str_)
     same_foot = feet[:, None] == feet
-    touches = same_foot @ np.isin(simulation.points, data.contact.geom)
+    touches = same_foot @ touching(simulation, data)
     standing = np.flatnonzero((same_foot @ loads > flight_force(robot)) & touches)  # loaded by the plan
     if not standing.size:
         return Correction(contact_forces=forces, joints=joints)
@@ -144,6 +145,11 @@ def _unborne(arms: Array, shares: Array, radius: float) -> Array:
     """
     spread = sum(share * skew(arm).T @ skew(arm) for arm, share in zip(arms * [1.0, 1.0, 0.0], shares, strict=True))
     return np.asarray(radius**2 * np.linalg.inv(spread + radius**2 * np.eye(3)))
+
+
+def touching(simulation: SimulationModel, data: Any) -> NDArray[np.bool_]:
+    """Return which contact points touch the ground in the state of MuJoCo's `MjData` of a model, (contacts,)."""
+    return np.isin(simulation.points, data.contact.geom)
 
 
 def rotation_vector(rotation: Array) -> Array:

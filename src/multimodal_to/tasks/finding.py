@@ -87,7 +87,7 @@ def asked(name: str, robot: Robot, values: Mapping[str, Any]) -> Scenario:
     if not is_starter(name, robot.name):
         refuse_unknown(name)
         scenario = bundled(name)
-        return changed(sized(scenario, robot) if robot.name in BUNDLED_FOR[1:] else scenario, values)
+        return changed(sized(scenario, robot) if follows_from(name, robot.name) else scenario, values)
     hints, said, rest = numbers(name), dict[str, Any](), dict[str, Any]()
     for key, value in values.items():
         if key in hints:
