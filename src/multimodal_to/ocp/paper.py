@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.contact import FACES
 from multimodal_to.models.units import ONE, ONE_OF_A_POINT, OwnSize
-from multimodal_to.ocp import constraints, contacts, costs, failures, limits, pushes, regions
+from multimodal_to.ocp import constraints, contacts, costs, failures, limits, one_line, pushes, regions
 from multimodal_to.ocp.contacts import ON_GROUND
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.schedule import Flags
@@ -102,7 +102,7 @@ def _hovers_last(parameters: Parameters) -> bool:
 
 
 def _unpushed(parameters: Parameters) -> NDArray[np.bool_]:
-    return pushes.unpushed(parameters, len(TWIST))
+    return pushes.unpushed(parameters, len(TWIST)) & one_line.needed_over_intervals(parameters)
 
 
 def _pushed(parameters: Parameters) -> NDArray[np.bool_]:
@@ -207,6 +207,7 @@ STATIC_EQUILIBRIUM = Constraint(
     scale=constraints.FORCE,
     labels=TWIST,
     when=_starts_at_rest,
+    present=one_line.needed_first,
 )
 STEADY_THRUST = Constraint(
     value=constraints.steady_thrust,
