@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import multimodal_to as mt
+from hopper import hopper
 from multimodal_to.errors import ScenarioError
+from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.schedule import Schedule, knots_of, runs
 from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.derived import surface_frames
@@ -111,6 +113,26 @@ def test_a_force_that_is_given_to_be_zero_and_a_height_on_flat_ground_are_bounds
         assert (np.abs(forces).transpose(0, 2, 1)[schedule.unloaded] == 0.0).all()
         heights = side["contact_positions"].reshape(4, 3, -1)[:, 2, 1:]
         assert heights[schedule.stands[:, 1:]] == pytest.approx(0.0, abs=1.1e-5)
+
+
+def test_a_point_that_stands_since_the_start_keeps_the_height_it_starts_with(trotting):
+    stands = Schedule.of(trotting.robot, trotting.scenario).stands
+    since_start = np.logical_and.accumulate(stands, axis=1)[:, 1:]
+    start = contact_positions(trotting.robot, trotting.parameters.standing)[2::3]
+    assert start.min() > 0.0
+    for side in (trotting.lower, trotting.upper):
+        heights = trotting.layout.read_horizon(side * trotting.scale)["contact_positions"].reshape(4, 3, -1)[:, 2, 1:]
+        for point in range(4):
+            assert heights[point][since_start[point]] == pytest.approx(start[point], rel=1e-6)
+        assert heights[stands[:, 1:] & ~since_start].min() > 2 * start.max()  # where it comes down later
+
+
+def test_rigid_legs_stand_where_they_start_until_they_leave(tmp_path):
+    """Any other height of their feet contradicts the balance of the start, from which the CoM has no speed."""
+    robot = hopper(tmp_path)
+    solution = mt.solve(mt.build(robot, mt.tasks.take_off(robot)), mt.Ipopt(max_iterations=100))
+    assert solution.status is mt.Status.OPTIMAL
+    assert mt.audit(robot, solution.trajectory).holds
 
 
 def test_rows_of_a_point_that_is_found_stay_where_it_is_found(dog):

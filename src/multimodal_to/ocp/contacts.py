@@ -5,6 +5,8 @@ A force that is given to be zero is a bound, and so is the height of a point tha
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as cs
 import numpy as np
 
@@ -13,11 +15,13 @@ from multimodal_to.models.contact import FACES
 from multimodal_to.models.sole import soles
 from multimodal_to.models.units import Sized
 from multimodal_to.ocp import constraints
+from multimodal_to.ocp.guess import contact_positions
 from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.schedule import Flags
 from multimodal_to.ocp.terms import Constraint, Where, at_least, each, equal
+from multimodal_to.scenarios.scenario import Start
 from multimodal_to.trajectory.quantities import XYZ
 
 ON_GROUND = Sized(1e-5, "m")
@@ -79,6 +83,17 @@ def _supports(parameters: Parameters, members: list[int]) -> list[int]:
     return [members[index] for index in chosen]
 
 
+def _held_since_start(parameters: Parameters) -> Flags:
+    """Return at which knots a point has the height that it started with: it has stood ever since."""
+    stands = np.logical_and.accumulate(parameters.contacts.stands, axis=1)
+    return held(parameters) & stands & (parameters.scenario.start is Start.STANDING)
+
+
+def _held_anew(parameters: Parameters) -> Flags:
+    """Return at which knots the height of a point is given that has come down, or starts elsewhere than standing."""
+    return held(parameters) & ~_held_since_start(parameters)
+
+
 def not_on(parameters: Parameters) -> Flags:
     """Return over which intervals a point is not given to be on."""
     return ~parameters.contacts.on
@@ -133,6 +148,13 @@ def _at_start(flags: Flags) -> Flags:
 
 
 # -------------------------------------------------------------------- what is given
+
+
+def rise(knot: Knot, parameters: Parameters) -> SX:
+    """d(p_i) less the height at the start: rigid legs cannot give way to another one."""
+    start = contact_positions(parameters.robot, parameters.standing).reshape(-1, 3)
+    heights = [parameters.surface.distance(cs.SX(point)) for point in start]
+    return constraints.heights(knot, parameters) - cs.evalf(cs.vertcat(cs.SX(0, 1), *heights))
 
 
 def clearance(knot: Knot, parameters: Parameters) -> SX:
@@ -232,7 +254,10 @@ GIVEN_ON = Constraint(
     labels=each("contact"),
     when=_gives,
     rigid=True,
-    present=held,
+    present=_held_anew,
+)
+GIVEN_ON_SINCE_START = replace(
+    GIVEN_ON, name="given_on_since_start", value=rise, within=equal(), present=_held_since_start
 )
 GIVEN_IN_PLACE = Constraint(
     name="given_in_place",
@@ -252,5 +277,5 @@ CLEARANCE = Constraint(
     when=_gives,
     present=_asked_clearance,
 )
-CONSTRAINTS = (GIVEN_OFF, GIVEN_ON, GIVEN_IN_PLACE, CLEARANCE)
+CONSTRAINTS = (GIVEN_OFF, GIVEN_ON, GIVEN_ON_SINCE_START, GIVEN_IN_PLACE, CLEARANCE)
 """What contacts that a scenario gives ask for; without any there are none of their rows."""
