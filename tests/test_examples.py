@@ -65,11 +65,7 @@ ALSO = {
 """What else an example shows; in the same test, since another would wait until the example has run."""
 
 
-LONG = ("18_jump_onto_box",)
-"""Examples that take as long as many others together."""
-
-
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.robots] * (name in LONG)) for name in NAMES])
+@pytest.mark.parametrize("name", NAMES)
 def test_every_example_runs(name, run_example):
     printed, trajectory = run_example(name)
     assert "optimal after" in printed
