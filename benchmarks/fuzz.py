@@ -39,7 +39,7 @@ import multimodal_to as mt
 from multimodal_to import errors, scenario_files, scenarios
 from multimodal_to.adam.inspection import describe
 from multimodal_to.errors import LONGEST, MultimodalError
-from multimodal_to.models.robot import bundled_robots
+from multimodal_to.models.loading import bundled_robots
 from multimodal_to.models.terrain import HeightField, Plane, Stairs
 from multimodal_to.replay.dress import read_dress
 from multimodal_to.replay.visuals import appearance

@@ -36,7 +36,8 @@ from rich.console import Console
 
 import multimodal_to as mt
 from multimodal_to import scenarios
-from multimodal_to.models.robot import ROBOT_FILE, Robot, bundled_robots
+from multimodal_to.models.loading import ROBOT_FILE, bundled_robots
+from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import Stairs
 from multimodal_to.models.units import Sized
 from multimodal_to.scenarios.scenario import Scenario

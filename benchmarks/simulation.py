@@ -28,7 +28,7 @@ from rich.console import Console
 
 import multimodal_to as mt
 from multimodal_to import scenarios
-from multimodal_to.models.robot import bundled_robots
+from multimodal_to.models.loading import bundled_robots
 from multimodal_to.simulation import Draws, Trial, run_trial, run_trials
 from multimodal_to.simulation.trials import CONTROLLERS, Make, gains_alone
 from multimodal_to.trajectory import Trajectory

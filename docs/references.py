@@ -20,7 +20,7 @@ from multimodal_to.auditing import PROPERTIES, Judged, Property
 from multimodal_to.files.keys import Key
 from multimodal_to.files.reading import LARGEST_TOML
 from multimodal_to.models.joint_units import either
-from multimodal_to.models.robot import load_robot
+from multimodal_to.models.loading import load_robot
 from multimodal_to.models.robot_keys import robot_keys
 from multimodal_to.models.terrain import MOST_NODES
 from multimodal_to.ocp import Constraint, Cost, Formulation, Parameters

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import multimodal_to as mt
-from multimodal_to.models.robot import Robot, bundled_robots, load_robot
+from multimodal_to.models.loading import bundled_robots, load_robot
+from multimodal_to.models.robot import Robot
 
 DOWN = "3.14159265359 0 0"  # of a frame that pushes the robot up
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from multimodal_to.adam.urdf import read_urdf
-from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.models.loading import load_robot
+from multimodal_to.models.robot import Robot
 from places import example_robots
 
 

@@ -8,7 +8,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from multimodal_to.files.writing import write_text
-from multimodal_to.models.robot import Robot, bundled_robots, load_robot
+from multimodal_to.models.loading import bundled_robots, load_robot
+from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 from multimodal_to.trajectory.derived import frame_poses
 

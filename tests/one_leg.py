@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.models.loading import load_robot
+from multimodal_to.models.robot import Robot
 
 _LINKS = {
     "body": (10.0, 0.1, 0.05),

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from hopper import hopper
-from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.models.loading import load_robot
+from multimodal_to.models.robot import Robot
 
 FOLLOWERS = {"right_pitch": (0.8, 0.05), "mast": (0.1, 0.1)}  # multiplier and offset [rad, m]
 

@@ -18,7 +18,8 @@ from multimodal_to.errors import MultimodalError
 from multimodal_to.exporting.motion import write_motion
 from multimodal_to.exporting.reading import read_motion
 from multimodal_to.models.contact import FrictionCone
-from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.models.loading import load_robot
+from multimodal_to.models.robot import Robot
 from multimodal_to.models.state import State
 from multimodal_to.models.terrain import FlatGround, HeightField, Plane, Stairs
 from multimodal_to.ocp import (

@@ -19,7 +19,7 @@ import pytest
 
 from multimodal_to.cli import main
 from multimodal_to.errors import InputError, ModelError, OutputError, ScenarioError, TrajectoryError
-from multimodal_to.models.robot import bundled_robots
+from multimodal_to.models.loading import bundled_robots
 from synthetic import take_off as synthetic_take_off
 
 PATIENCE = 5.0  # [s]

@@ -12,7 +12,7 @@ from multimodal_to import scenario_files, scenarios
 from multimodal_to.errors import LONGEST, ModelError, MultimodalError, OutputError, listed, shown, unknown
 from multimodal_to.files.reading import LARGEST_TOML, parse_toml, read_bytes, read_toml
 from multimodal_to.files.writing import whole, write_text
-from multimodal_to.models.robot import bundled_robots
+from multimodal_to.models.loading import bundled_robots
 from multimodal_to.replay.dress import read_dress
 from synthetic import take_off as synthetic_take_off
 

@@ -8,7 +8,7 @@ import pytest
 import multimodal_to as mt
 from drones import drone
 from multimodal_to.models import proportions
-from multimodal_to.models.robot import bundled_robots, load_robot
+from multimodal_to.models.loading import bundled_robots, load_robot
 from solo import solo
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from multimodal_to.errors import ModelError
-from multimodal_to.models.robot import bundled_robots, load_robot
+from multimodal_to.models.loading import bundled_robots, load_robot
 from tied_hopper import tied_hopper
 
 

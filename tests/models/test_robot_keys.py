@@ -9,7 +9,7 @@ import pytest
 import tomli_w
 
 from multimodal_to.errors import ModelError
-from multimodal_to.models.robot import bundled_robots, load_robot
+from multimodal_to.models.loading import bundled_robots, load_robot
 from multimodal_to.models.robot_keys import robot_keys
 
 KEYS = robot_keys()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import multimodal_to as mt
-from multimodal_to.models.robot import bundled_robots
+from multimodal_to.models.loading import bundled_robots
 from multimodal_to.ocp.one_line import push_along_one_line
 
 

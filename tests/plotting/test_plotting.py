@@ -13,7 +13,7 @@ from matplotlib.text import Text
 
 from multimodal_to import plotting, scenarios
 from multimodal_to.errors import InputError, OutputError
-from multimodal_to.models.robot import load_robot
+from multimodal_to.models.loading import load_robot
 from multimodal_to.plotting import style
 from multimodal_to.scenarios.data import to_json
 from multimodal_to.trajectory import derived, rules

@@ -15,7 +15,7 @@ import yourdfpy
 from hopper import hopper
 from multimodal_to import children, replay, scenarios
 from multimodal_to.errors import InputError, OutputError
-from multimodal_to.models.robot import load_robot
+from multimodal_to.models.loading import load_robot
 from multimodal_to.models.terrain import Stairs
 from multimodal_to.models.terrain_mesh import CELL
 from multimodal_to.replay import effects, scene

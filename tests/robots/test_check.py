@@ -7,7 +7,7 @@ import pytest
 from matplotlib.collections import PathCollection
 
 from drones import drone
-from multimodal_to.models.robot import bundled_robots, load_robot
+from multimodal_to.models.loading import bundled_robots, load_robot
 from multimodal_to.robots import check
 from multimodal_to.robots.picture import draw_home
 

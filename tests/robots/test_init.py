@@ -11,7 +11,7 @@ import pytest
 from adam_robots import example_robots
 from multimodal_to.errors import ModelError, OutputError
 from multimodal_to.files.packages import package_file
-from multimodal_to.models.robot import load_robot
+from multimodal_to.models.loading import load_robot
 from multimodal_to.robots import check, init
 
 ICUB = package_file("icub-models", "iCubGazeboV2_5/model.urdf")

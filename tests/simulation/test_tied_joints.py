@@ -7,7 +7,7 @@ import pytest
 
 from hopper import hopper
 from multimodal_to.errors import ModelError
-from multimodal_to.models.robot import load_robot
+from multimodal_to.models.loading import load_robot
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.simulation import build_model, disagreement, play, random_states
 from places import example_robots

@@ -18,7 +18,8 @@ from multimodal_to.cli.completion import robots_or_folders, scenarios_or_files
 from multimodal_to.errors import InputError, OutputError, TrajectoryError, shortened
 from multimodal_to.exporting.reading import flavours_of, read_motion
 from multimodal_to.files.numbers import number, whole_number
-from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.models.loading import load_robot
+from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios import find as bundled
 from multimodal_to.scenarios import paper as as_in_paper
 from multimodal_to.scenarios.files import change, load

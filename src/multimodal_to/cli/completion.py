@@ -8,7 +8,7 @@ from pathlib import Path
 
 from multimodal_to.exporting.export import EXPORTS
 from multimodal_to.exporting.motion import FLAVOURS
-from multimodal_to.models.robot import bundled_robots
+from multimodal_to.models.loading import bundled_robots
 from multimodal_to.scenarios import SCENARIOS
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS
 from multimodal_to.tasks import TASKS

@@ -12,7 +12,8 @@ from multimodal_to.adam.inspection import describe
 from multimodal_to.cli.common import app, out, say, writable
 from multimodal_to.cli.completion import robots_or_folders, robots_or_urdfs
 from multimodal_to.errors import OutputError
-from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.models.loading import load_robot
+from multimodal_to.models.robot import Robot
 
 robot_app = typer.Typer(help="Look at robots, and make folders for new ones.", no_args_is_help=True)
 app.add_typer(robot_app, name="robot")

@@ -26,7 +26,8 @@ from multimodal_to.cli.completion import exports, figures, flavours
 from multimodal_to.errors import InputError, ModelError, OutputError, unknown
 from multimodal_to.exporting.export import EXPORTS, write_mujoco, write_pinocchio
 from multimodal_to.exporting.motion import FLAVOURS, write_motion
-from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.models.loading import load_robot
+from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.conditions import under_conditions
 

@@ -38,7 +38,8 @@ from multimodal_to.cli.tasks import free_checkpoint, given
 from multimodal_to.doctor import Diagnosis, Severity, refusal
 from multimodal_to.doctor import doctor as examine
 from multimodal_to.errors import InputError, ScenarioError, apart, listed
-from multimodal_to.models.robot import Robot, bundled_robots, load_robot
+from multimodal_to.models.loading import bundled_robots, load_robot
+from multimodal_to.models.robot import Robot
 from multimodal_to.native import missing
 from multimodal_to.ocp import Formulation, Problem, build
 from multimodal_to.ocp.integration import LEAPFROG

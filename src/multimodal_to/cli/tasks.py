@@ -9,7 +9,7 @@ from rich.console import Console
 
 from multimodal_to.cli.common import chosen, of_others, robot_for
 from multimodal_to.errors import InputError, ScenarioError
-from multimodal_to.models.robot import load_robot
+from multimodal_to.models.loading import load_robot
 from multimodal_to.models.state import State
 from multimodal_to.ocp import Formulation
 from multimodal_to.scenarios.data import stored

@@ -13,7 +13,8 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.arguments import checked
 from multimodal_to.errors import ModelError, listed
 from multimodal_to.models import proportions
-from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.models.loading import load_robot
+from multimodal_to.models.robot import Robot
 
 LEVEL = 0.01
 """Contact points at home are on one level where they differ by less than this in height [L]."""

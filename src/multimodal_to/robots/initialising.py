@@ -13,7 +13,8 @@ from multimodal_to.arguments import checked
 from multimodal_to.errors import ModelError, MultimodalError, OutputError
 from multimodal_to.files.packages import package_file
 from multimodal_to.files.writing import write_text
-from multimodal_to.models.robot import ROBOT_FILE, Robot, load_robot
+from multimodal_to.models.loading import ROBOT_FILE, load_robot
+from multimodal_to.models.robot import Robot
 from multimodal_to.robots.drafting import draft
 from multimodal_to.robots.writing import toml
 

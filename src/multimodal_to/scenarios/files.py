@@ -19,7 +19,7 @@ from multimodal_to.errors import MultimodalError, ScenarioError, shortened, show
 from multimodal_to.files.numbers import number
 from multimodal_to.files.reading import parse_toml, read_toml
 from multimodal_to.files.writing import write_text
-from multimodal_to.models.robot import bundled_robots
+from multimodal_to.models.loading import bundled_robots
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.scenarios.bundled import find
 from multimodal_to.scenarios.data import from_dict, to_dict

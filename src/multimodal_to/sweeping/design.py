@@ -17,7 +17,8 @@ import numpy as np
 from multimodal_to.arguments import checked
 from multimodal_to.errors import InputError, MultimodalError, listed, shown
 from multimodal_to.files.reading import is_number, read_toml
-from multimodal_to.models.robot import Robot, bundled_robots, load_robot
+from multimodal_to.models.loading import bundled_robots, load_robot
+from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios import find
 from multimodal_to.scenarios.data import from_dict, to_dict
 from multimodal_to.scenarios.files import changed, load

@@ -16,7 +16,8 @@ from typing import Any
 from multimodal_to.auditing.audit import Audit, audit
 from multimodal_to.errors import LONGEST, MultimodalError, OutputError, said, shortened
 from multimodal_to.files.writing import make_folder
-from multimodal_to.models.robot import Robot, load_robot
+from multimodal_to.models.loading import load_robot
+from multimodal_to.models.robot import Robot
 from multimodal_to.ocp import Problem, build
 from multimodal_to.ocp.rebinding import rebind, same_terms
 from multimodal_to.scenarios.data import from_dict, to_json

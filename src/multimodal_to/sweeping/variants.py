@@ -17,7 +17,8 @@ from multimodal_to.adam.spatial import Array
 from multimodal_to.errors import InputError, ModelError, OutputError, listed, shown, unknown
 from multimodal_to.files.reading import is_number, read_toml
 from multimodal_to.files.writing import scratch, write_text
-from multimodal_to.models.robot import ROBOT_FILE, Robot, bundled_robots, load_robot
+from multimodal_to.models.loading import ROBOT_FILE, bundled_robots, load_robot
+from multimodal_to.models.robot import Robot
 
 PREFIX = "robot."
 """What keys begin with that change the robot."""

@@ -17,7 +17,8 @@ import numpy as np
 from multimodal_to.arguments import checked
 from multimodal_to.errors import TrajectoryError, shown
 from multimodal_to.files.reading import is_number
-from multimodal_to.models.robot import Robot, bundled_robots, load_robot
+from multimodal_to.models.loading import bundled_robots, load_robot
+from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory.trajectory import Trajectory
 
 _SAME = 1e-9
