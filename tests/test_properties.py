@@ -19,7 +19,8 @@ from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.terrain import FlatGround, HeightField, Plane, Stairs
 from multimodal_to.scenarios import files as scenario_files
 from multimodal_to.scenarios.data import from_dict, to_dict
-from multimodal_to.scenarios.scenario import Scenario, Start, Terminal, Weights
+from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
+from multimodal_to.scenarios.weights import Weights
 from multimodal_to.trajectory import QUANTITIES, Trajectory
 from multimodal_to.trajectory.resampling import resample
 from random_trees import random_urdf

@@ -17,7 +17,7 @@ from multimodal_to.auditing.properties import judged
 from multimodal_to.models.contact import DESCENT_RATE
 from multimodal_to.models.sole import PRESSURE_SLACK, Sole, soles
 from multimodal_to.scenarios.data import to_json
-from multimodal_to.scenarios.scenario import Margins
+from multimodal_to.scenarios.margins import Margins
 from multimodal_to.trajectory import QUANTITIES, Trajectory, rules
 from multimodal_to.trajectory.derived import frame_poses, loaded_force
 from solo import solo

@@ -24,7 +24,8 @@ from multimodal_to.doctor.hover import trimmed, upright
 from multimodal_to.doctor.task import Task
 from multimodal_to.models.terrain import Plane
 from multimodal_to.models.turbines import greatest_held, spool_up
-from multimodal_to.scenarios.scenario import Start, Terminal, Weights
+from multimodal_to.scenarios.scenario import Start, Terminal
+from multimodal_to.scenarios.weights import Weights
 
 SECONDS = 2.0  # of one processor, for one diagnosis
 

@@ -13,7 +13,7 @@ from multimodal_to.models.contact import FrictionCone
 from multimodal_to.models.terrain import FlatGround, HeightField, Plane, Stairs
 from multimodal_to.scenarios import Start, Terminal, Weights
 from multimodal_to.scenarios.data import from_dict, stored, to_dict, to_json
-from multimodal_to.scenarios.scenario import Margins
+from multimodal_to.scenarios.margins import Margins
 from synthetic import take_off as synthetic_take_off
 
 

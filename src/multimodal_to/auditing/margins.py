@@ -11,7 +11,8 @@ from multimodal_to.models.contact import DESCENT_RATE
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.sole import PRESSURE_SLACK, Sole, soles
 from multimodal_to.models.terrain import FlatGround
-from multimodal_to.scenarios.scenario import Margins, Scenario
+from multimodal_to.scenarios.margins import Margins
+from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import rules
 from multimodal_to.trajectory.derived import loaded_force, surface_frames
 

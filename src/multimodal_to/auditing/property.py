@@ -12,7 +12,8 @@ from multimodal_to.models.joint_units import joint_units
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.sole import soles
 from multimodal_to.models.units import Sized
-from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal
+from multimodal_to.scenarios.margins import Margins
+from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
 from multimodal_to.trajectory import rules
 
 

@@ -23,7 +23,8 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios import find as bundled
 from multimodal_to.scenarios import paper as as_in_paper
 from multimodal_to.scenarios.files import change, load
-from multimodal_to.scenarios.scenario import Margins, Scenario
+from multimodal_to.scenarios.margins import Margins
+from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.tasks import TASKS, find
 from multimodal_to.tasks.finding import refuse_unknown
 from multimodal_to.trajectory import Trajectory

@@ -16,8 +16,10 @@ from multimodal_to.scenarios.failures import JetFailure
 from multimodal_to.scenarios.gaits import GaitKind, GaitPlan
 from multimodal_to.scenarios.keyframes import FrameTarget, Keyframe, Momentum
 from multimodal_to.scenarios.limits import Limits
+from multimodal_to.scenarios.margins import Margins
 from multimodal_to.scenarios.regions import Box, Wall
-from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
+from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
+from multimodal_to.scenarios.weights import Weights
 from multimodal_to.trajectory.pushes import KnownPush
 
 __all__ = [

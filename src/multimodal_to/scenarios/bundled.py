@@ -13,7 +13,9 @@ from typing import Any
 from multimodal_to.arguments import checked
 from multimodal_to.errors import ScenarioError, unknown
 from multimodal_to.models.terrain import Stairs
-from multimodal_to.scenarios.scenario import Margins, Scenario, Start, Terminal, Weights
+from multimodal_to.scenarios.margins import Margins
+from multimodal_to.scenarios.scenario import Scenario, Start, Terminal
+from multimodal_to.scenarios.weights import Weights
 from multimodal_to.values import FrozenMapping
 
 

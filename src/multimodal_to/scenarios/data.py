@@ -14,7 +14,8 @@ from multimodal_to.errors import ScenarioError, shown
 from multimodal_to.files.records import Records
 from multimodal_to.models.terrain import SURFACES, FlatGround, Surface
 from multimodal_to.scenarios.keyframes import HOME
-from multimodal_to.scenarios.scenario import Margins, Scenario, Vector3
+from multimodal_to.scenarios.margins import Margins
+from multimodal_to.scenarios.scenario import Scenario, Vector3
 from multimodal_to.trajectory import Trajectory
 
 HEIGHTS = {"initial_com_height": "initial_com", "final_com_height": "final_com"}

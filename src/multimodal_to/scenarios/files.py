@@ -23,7 +23,9 @@ from multimodal_to.models.loading import bundled_robots
 from multimodal_to.models.terrain import FlatGround
 from multimodal_to.scenarios.bundled import find
 from multimodal_to.scenarios.data import from_dict, to_dict
-from multimodal_to.scenarios.scenario import Margins, Scenario, Weights
+from multimodal_to.scenarios.margins import Margins
+from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.scenarios.weights import Weights
 from multimodal_to.values import FrozenMapping
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.units import Units
-from multimodal_to.scenarios.scenario import Weights
+from multimodal_to.scenarios.weights import Weights
 
 ONE = 1e5
 """A weight of one: what costs it is one of the robot's own units, over one unit of time √(L/g)."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from multimodal_to.adam.spatial import Array
 from multimodal_to.models.robot import Robot
-from multimodal_to.scenarios.scenario import Margins
+from multimodal_to.scenarios.margins import Margins
 
 STROKE, DEPTHS = 0.2, 4
 """How far the CoM is lowered before a jump [L], and at how many depths the push is looked at."""

@@ -11,7 +11,8 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.scenarios.contacts import ContactState
 from multimodal_to.scenarios.gaits import GaitKind, GaitPlan, groups_of
 from multimodal_to.scenarios.keyframes import HOME, Keyframe, Momentum
-from multimodal_to.scenarios.scenario import Margins, Scenario, Terminal
+from multimodal_to.scenarios.margins import Margins
+from multimodal_to.scenarios.scenario import Scenario, Terminal
 from multimodal_to.tasks.costs import weights
 from multimodal_to.tasks.given import given, looks, positive, refuse_footless
 from multimodal_to.tasks.leaping import leap_height
