@@ -3,8 +3,9 @@
     python benchmarks/robustness.py [TASK ...] [--robot ironcub ...] [--variations 10] [--seed 1] [--workers 2]
         [--lines FILE] [--into PAGE]
 
-The iRonCubs have the six bundled scenarios, the other robots the starter tasks of `TASKS`. Every variation changes all
-of these at once, by lengths that are those of the iRonCub and follow the robot's L:
+The iRonCubs have the six bundled scenarios, but that the Mk3's jump is the starter task, and the other robots the
+starter tasks of `TASKS`. Every variation changes all of these at once, by lengths that are those of the iRonCub and
+follow the robot's L:
 
 - the target's height by up to ±0.05 m (the jump, which is as high as the motors can, by down to −0.05 m) and, where
   there is one, the distance by up to ±0.2 m (the step and the place on it by ±0.1 m); of a starter task its own size,
@@ -41,6 +42,7 @@ from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import Stairs
 from multimodal_to.models.units import Sized
 from multimodal_to.scenarios.scenario import Scenario
+from multimodal_to.tasks.finding import is_starter
 from pages import put
 
 SIDE_STEP = "side-step"
@@ -106,7 +108,7 @@ def vary(robot_name: str, name: str, index: int, seed: int) -> tuple[Robot, Scen
     limits, home = robot.joint_limits, robot.home
     posture = np.clip(home.joint_positions + turns, limits.lower, limits.upper)
     robot = replace(robot, home=replace(home, joint_positions=posture))
-    if TASKS[robot_name] != tuple(scenarios.SCENARIOS):
+    if is_starter(name, robot_name) or name == SIDE_STEP:
         friction = robot.friction * (0.75 + 0.5 * (friction - 0.25) / 0.35)
         task, size = _starter(robot, name, height)
         return robot, replace(task, friction=friction), f"{size}, friction {friction:.2f}, mass {1 + 0.03 * mass:.3f}"

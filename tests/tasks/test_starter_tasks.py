@@ -171,6 +171,7 @@ def test_the_command_line_takes_starter_tasks():
 def test_a_bundled_scenario_is_in_the_units_of_the_robot_that_it_is_not_written_for_and_ahead_of_it():
     cub, mk3 = mt.load_robot("ironcub"), mt.load_robot("ironcub-mk3")
     assert mt.tasks.find("walk-to-fly", cub) == mt.scenarios.walk_to_fly()
+    assert mt.tasks.find("jump", mk3) == mt.tasks.jump(mk3)
     own, written = mt.tasks.find("step-up", mk3), mt.scenarios.step_up()
     taller = mk3.standing_height / cub.standing_height
     assert own.initial_com[2] == pytest.approx(taller * written.initial_com[2], rel=1e-4)

@@ -52,7 +52,7 @@ from multimodal_to.solving import Ipopt, Solution, Status, relax
 from multimodal_to.solving import solve as run_solver
 from multimodal_to.solving.linear_solvers import AUTO, LINEAR_SOLVERS, choose
 from multimodal_to.tasks import BUNDLED_FOR, TASKS
-from multimodal_to.tasks.finding import numbers, refuse_unknown
+from multimodal_to.tasks.finding import is_starter, numbers, refuse_unknown
 from multimodal_to.trajectory import Trajectory
 from multimodal_to.trajectory.conditions import under_conditions
 from multimodal_to.trajectory.derived import largest_torques
@@ -71,9 +71,9 @@ def list_scenarios() -> None:
         scenario = make()
         table.add_row(scenario.name, f"{scenario.title}\n{_numbers(scenario)}")
     out.print(table)
-    both, those = listed([name for name in TASKS if name in SCENARIOS]), listed(BUNDLED_FOR)
+    above = [f"{name} of {robot}" for robot in BUNDLED_FOR for name in TASKS if not is_starter(name, robot)]
     out.print(
-        f"\nStarter tasks of any robot, as in `solve squat --robot DIR`; {both} are those above for {those}:\n",
+        f"\nStarter tasks of any robot, as in `solve squat --robot DIR`; {listed(above)} are those above:\n",
         soft_wrap=True,
     )
     table = Table(Column(no_wrap=True), Column(), box=None, show_header=False, pad_edge=False)

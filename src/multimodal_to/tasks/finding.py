@@ -34,6 +34,11 @@ TASKS: Mapping[str, Callable[..., Scenario]] = FrozenMapping(
 """The starter tasks by name."""
 BUNDLED_FOR = ("ironcub", "ironcub-mk3")
 """The robots, by name, for which a name that both have is the bundled scenario; it is written for the first."""
+NOT_SIZED = ("jump",)
+"""Bundled scenarios that the others of `BUNDLED_FOR` do not get in their own size.
+
+The jump asks for a height of the CoM, which a robot that bends its knees at home reaches standing straight.
+"""
 
 
 def numbers(name: str) -> Mapping[str, Any]:
@@ -44,7 +49,9 @@ def numbers(name: str) -> Mapping[str, Any]:
 
 def is_starter(name: str, robot: str) -> bool:
     """Return whether a name is a starter task for the robot of a name."""
-    return name in TASKS and not (name in SCENARIOS and robot in BUNDLED_FOR)
+    if name not in TASKS or name not in SCENARIOS:
+        return name in TASKS
+    return robot not in BUNDLED_FOR or (robot != BUNDLED_FOR[0] and name in NOT_SIZED)
 
 
 def follows_from(name: str, robot: str) -> bool:
@@ -58,7 +65,7 @@ def find(name: str, robot: Robot, settings: Iterable[str] = ()) -> Scenario:
 
     `jump` and `take-off` are names of both: they are the bundled scenarios for the robots of `BUNDLED_FOR`, and the
     starter tasks for any other. Those of `BUNDLED_FOR` behind the first get bundled scenarios of their own size, by
-    `sizing.sized`.
+    `sizing.sized`, but for those of `NOT_SIZED`.
 
     Args:
         name: of the task.

@@ -33,14 +33,17 @@ _RUNNING: Mapping[str, str] = FrozenMapping(
 )
 """The running weights of the bundled scenarios, and the unit of what each weighs."""
 _SKIMMING = 2e8
-"""The least weight of feet that move along the ground close to it, with jets: carried by them, bent legs glide."""
+"""The least weight of feet that move along the ground close to it, with jets: carried by them, bent legs glide.
+
+Where steps are guessed it is the scenario's own: with this one the iRonCub-Mk3 stands until it flies.
+"""
 
 
 def sized(scenario: Scenario, robot: Robot) -> Scenario:
     """Return a bundled scenario in the units m, L and √(L/g) of a robot (W. Froude, 1874), ahead of it.
 
     Lengths and times, the weights, and ε_t are those of the iRonCub times the ratio of the robots' units. With jets,
-    feet that glide have at least the weight `_SKIMMING`.
+    feet that glide have at least the weight `_SKIMMING`, but for a walk.
 
     Args:
         scenario: one of `scenarios.SCENARIOS`.
@@ -56,7 +59,7 @@ def sized(scenario: Scenario, robot: Robot) -> Scenario:
         x, y, z = com
         return ahead * length * x, ahead * length * y, length * z
 
-    least = _SKIMMING if scenario.jets else 0.0
+    least = _SKIMMING if scenario.jets and not scenario.guess_steps else 0.0
     weights = replace(scenario.weights, skimming=max(scenario.weights.skimming, least))
     speeds = {group: weight / (by("rad/s") ** 2 * time) for group, weight in weights.joint_velocities.items()}
     running = {name: getattr(weights, name) / (by(unit) ** 2 * time) for name, unit in _RUNNING.items()}
