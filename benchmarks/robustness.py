@@ -152,6 +152,9 @@ def _moved(scenario: Scenario, height: float, distance: float) -> tuple[Scenario
     x, y, z = scenario.end_com
     if isinstance(scenario.surface, Stairs):
         step = replace(scenario.surface, edges=(scenario.surface.edges[0] + 0.5 * distance,))
+        scenario = replace(
+            scenario, walls=tuple(replace(wall, offset=wall.offset + 0.5 * distance) for wall in scenario.walls)
+        )
         moved = replace(scenario, surface=step, final_com=(x + 0.5 * math.copysign(distance, x * distance), y, z))
         return moved, f", distance {0.5 * distance:+.3f} m"
     if x:

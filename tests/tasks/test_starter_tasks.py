@@ -178,6 +178,9 @@ def test_a_bundled_scenario_is_in_the_units_of_the_robot_that_it_is_not_written_
     assert own.final_com[0] == pytest.approx(-taller * written.final_com[0], rel=1e-4)  # it looks the other way
     assert own.surface.direction == (1.0, 0.0)
     assert own.surface.heights == pytest.approx([taller * height for height in written.surface.heights], rel=1e-4)
+    (wall,) = own.walls  # its heels would slip off the edge
+    assert wall.normal == (1.0, 0.0, 0.0)
+    assert wall.offset > own.surface.edges[0] + 0.5 * own.surface.width
     assert own.interval_max == pytest.approx(taller**0.5 * written.interval_max, rel=1e-4)
     heavier = mk3.weight / cub.weight
     assert own.weights.contact_forces * heavier**2 * taller**0.5 == pytest.approx(

@@ -9,6 +9,7 @@ from typing import Any
 from multimodal_to.models.robot import Robot
 from multimodal_to.models.terrain import Stairs
 from multimodal_to.models.units import Sized
+from multimodal_to.scenarios.regions import Wall
 from multimodal_to.scenarios.scenario import Scenario, Vector3
 from multimodal_to.tasks.given import looks
 from multimodal_to.values import FrozenMapping
@@ -38,12 +39,18 @@ _SKIMMING = 2e8
 Where steps are guessed it is the scenario's own: with this one the iRonCub-Mk3 stands until it flies.
 """
 
+_BEYOND, _LANDED = 0.08, 0.4
+"""How far beyond the edge of a step feet stand [L], and from which share of the horizon on [1].
+
+Nearer to it the heels of the iRonCub-Mk3, whose soles are longer, slip off in MuJoCo.
+"""
+
 
 def sized(scenario: Scenario, robot: Robot) -> Scenario:
     """Return a bundled scenario in the units m, L and √(L/g) of a robot (W. Froude, 1874), ahead of it.
 
     Lengths and times, the weights, and ε_t are those of the iRonCub times the ratio of the robots' units. With jets,
-    feet that glide have at least the weight `_SKIMMING`, but for a walk.
+    feet that glide have at least the weight `_SKIMMING`, but for a walk. On a step the feet stand `_BEYOND` its edge.
 
     Args:
         scenario: one of `scenarios.SCENARIOS`.
@@ -76,10 +83,13 @@ def sized(scenario: Scenario, robot: Robot) -> Scenario:
         changed["sliding_max"] = Sized(scenario.sliding_max, "N m", of_a_point=True).of(robot.units)
     if isinstance(stairs := scenario.surface, Stairs):
         x, y = stairs.direction
-        changed["surface"] = Stairs(
+        changed["surface"] = steps = Stairs(
             edges=tuple(length * edge for edge in stairs.edges),
             heights=tuple(length * height for height in stairs.heights),
             direction=(ahead * x, ahead * y),
             width=length * stairs.width,
         )
+        top = steps.edges[-1] + 0.5 * steps.width + _BEYOND * robot.standing_height
+        wall = Wall(normal=(*steps.direction, 0.0), offset=top, of=robot.contact_names, begin=_LANDED)
+        changed["walls"] = (*scenario.walls, wall)
     return replace(scenario, **changed)
