@@ -131,6 +131,9 @@ def test_what_a_robot_cannot_do_is_refused_with_the_reason(tmp_path, solo):
     assert "has no jets" in refusal(mt.tasks.hover, solo)
     assert "has 2 feet; expected four for a trot" in refusal(mt.tasks.trot, mt.load_robot("talos"))
     assert "has no joints" in refusal(mt.tasks.squat, mt.load_robot("quadrotor"))
+    (tmp_path / "stiff").mkdir()
+    stiff = odd_robot(tmp_path / "stiff", joints=JOINTS, feet=True, jets=False)
+    assert "no joint moves a foot" in refusal(mt.tasks.squat, stiff)
     assert "height is -0.1; expected a positive number [m]" in refusal(mt.tasks.jump, solo, height=-0.1)
     assert "without gravity" in refusal(mt.tasks.jump, solo.with_gravity(np.zeros(3)))
 

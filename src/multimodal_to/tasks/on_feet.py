@@ -194,6 +194,9 @@ def _refuse_stiff(robot: Robot, what: str) -> None:
     refuse_footless(robot, what.split()[-1])
     if not robot.joint_names:
         raise ScenarioError(f"{robot.name} has no joints; expected a robot with legs that move for {what}")
+    tree = robot.kindyn.tree
+    if not any(tree.path(tree.frame(name).body) for name in robot.contact_names):
+        raise ScenarioError(f"no joint moves a foot of {robot.name}; expected a robot with legs that move for {what}")
 
 
 def _easy_height(robot: Robot) -> float:
