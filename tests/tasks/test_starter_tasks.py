@@ -86,7 +86,7 @@ def test_robots_of_one_shape_get_one_task_in_their_own_units(task, solo):
 
 
 def scaled(folder, size):
-    """A robot of three feet and a joint, with every length times `size` and every mass times its cube."""
+    """A robot of three feet, one on a joint, with every length times `size` and every mass times its cube."""
     folder.mkdir()
     odd_robot(folder, joints={"hip": "revolute"}, feet=True, jets=False)
     urdf, toml = folder / "robot.urdf", folder / "robot.toml"
@@ -98,7 +98,10 @@ def scaled(folder, size):
         numbers = " ".join(str(float(number) * size ** powers[found[1]]) for number in found[3].split())
         return f"{found[1]}={found[2]}{numbers}{found[2]}"
 
-    urdf.write_text(re.sub(r"\b(xyz|size|value|ixx|iyy|izz)=(['\"])([^'\"]+)\2", grown, urdf.read_text()))
+    text = re.sub(r"\b(xyz|size|value|ixx|iyy|izz)=(['\"])([^'\"]+)\2", grown, urdf.read_text())
+    urdf.write_text(
+        text.replace('<parent link="body"/><child link="back"/>', '<parent link="hip link"/><child link="back"/>')
+    )
     toml.write_text(toml.read_text().replace("0.0, 0.0, 0.4]", f"0.0, 0.0, {0.4 * size}]"))
     return mt.load_robot(folder)
 
