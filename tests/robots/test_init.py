@@ -148,6 +148,12 @@ def test_every_placeholder_is_named_with_what_takes_its_place(tmp_path):
     assert (limits.lower[knees] * limits.upper[knees] > 0).all()  # they bend one way
 
 
+def test_a_joint_that_the_urdf_gives_no_range_is_named(tmp_path):
+    notes = init(example_robots() / "quadruped_description/urdf/quadruped.urdf", tmp_path / "robot").notes
+    assert "the URDF leaves FL_KFE, FR_KFE, BL_KFE, BR_KFE no range to move in; state one there" in notes
+    assert "# it cannot move: the URDF's range is 0 to 0" in (tmp_path / "robot" / "robot.toml").read_text("utf-8")
+
+
 def test_mjcf_is_not_read_and_said_to_be_none(tmp_path):
     for name in ("robot.xml", "robot.urdf"):
         (tmp_path / name).write_text("<mujoco><worldbody/></mujoco>")

@@ -299,6 +299,10 @@ def _range(joint: Joint, home: float, is_knee: bool, height: float) -> Range:
         else:
             lower, upper = min(-3.14, home), max(3.14, home)
             guesses.append("range guessed: the URDF has a placeholder")
+    elif lower == upper:
+        guesses.append(
+            f"it cannot move: the URDF's range is {lower:g} to {upper:g}, which it also is where none is stated"
+        )
     if not 0 < speed < VELOCITY_PLACEHOLDER:
         unit = (9.81 * height) ** 0.5 if joint.kind == "prismatic" else (9.81 / height) ** 0.5
         speed = float(f"{SPEED * unit:.2g}")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from multimodal_to.adam.urdf import parse_urdf
 from multimodal_to.arguments import checked
-from multimodal_to.errors import ModelError, MultimodalError, OutputError
+from multimodal_to.errors import ModelError, MultimodalError, OutputError, listed
 from multimodal_to.files.packages import package_file
 from multimodal_to.files.writing import write_text
 from multimodal_to.models.loading import ROBOT_FILE, load_robot
@@ -70,6 +70,8 @@ def init(
     guessed = [joint.name for joint, of in zip(found.joints, found.ranges, strict=True) if of.guesses]
     if guessed:
         notes.append(f"the URDF has placeholders for limits of {len(guessed)} joints, which were guessed")
+    if stuck := [joint.name for joint in found.joints if joint.lower == joint.upper]:
+        notes.append(f"the URDF leaves {listed(stuck)} no range to move in; state one there")
     if found.bent_legs:
         notes.append(f"straight legs were bent at home: {', '.join(found.bent_legs)}")
     if not found.feet:
