@@ -12,6 +12,7 @@ import numpy as np
 from multimodal_to.auditing.findings import Motion, Worst, worst_of
 from multimodal_to.auditing.property import Judged, Of, Property
 from multimodal_to.models.robot import Robot
+from multimodal_to.models.stiff_legs import CREEP, on_stiff_legs
 from multimodal_to.scenarios.contacts import ContactState, ContactStretch
 from multimodal_to.scenarios.scenario import Scenario
 from multimodal_to.trajectory import rules
@@ -42,7 +43,8 @@ CONTACTS = (
         limit=1e-4,
         of=Of.HEIGHT,
         reason="chosen: misses of 1e-5 m may add up over some intervals, and a sole's corners turn with it",
-        meaning="way along the ground of a contact point, from where a stretch on which it is given to be on begins",
+        meaning="way along the ground of a contact point, from where a stretch on which it is given to be on begins; "
+        "on legs with too few joints to keep it, beyond 1.4e-5 m an interval",
         judged=Judged.WITH_CONTACTS,
     ),
     Property(
@@ -74,6 +76,7 @@ def contact_findings(motion: Motion, scenario: Scenario) -> list[Worst]:
     robot, knots = motion.robot, motion.trajectory.knots
     heights, _, tangents = surface_frames(scenario.surface, motion.points)
     forces = np.abs(motion.contact_forces).max(axis=2)
+    creep = np.sqrt(2.0) * CREEP.of(robot.units) * on_stiff_legs(robot)
     loads, off_ground, moved, below = (np.zeros((len(robot.contacts), knots + 1)) for _ in range(4))
     for given in _given(robot, scenario, knots):
         knots_within = slice(given.first, given.last + 1)
@@ -87,7 +90,8 @@ def contact_findings(motion: Motion, scenario: Scenario) -> list[Worst]:
             places = motion.points[given.point, knots_within]
             off_ground[given.point, knots_within] = np.abs(heights[given.point, knots_within])
             ways = np.einsum("kxt,kx->kt", tangents[given.point, knots_within], places - places[0])
-            moved[given.point, knots_within] = np.linalg.norm(ways, axis=1)
+            crept = creep[given.point] * np.arange(len(places))
+            moved[given.point, knots_within] = np.maximum(np.linalg.norm(ways, axis=1) - crept, 0.0)
     names = robot.contact_names
     return [
         worst_of("given off: contact force", loads, names),

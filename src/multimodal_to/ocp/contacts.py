@@ -6,6 +6,7 @@ A force that is given to be zero is a bound, and so is the height of a point tha
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import casadi as cs
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from multimodal_to.adam.spatial import SX
 from multimodal_to.models.contact import FACES
 from multimodal_to.models.sole import soles
+from multimodal_to.models.stiff_legs import CREEP, on_stiff_legs
 from multimodal_to.models.units import Sized
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.guess import contact_positions
@@ -20,7 +22,7 @@ from multimodal_to.ocp.integration import Interval
 from multimodal_to.ocp.knot import Knot
 from multimodal_to.ocp.parameters import Parameters
 from multimodal_to.ocp.schedule import Flags
-from multimodal_to.ocp.terms import Constraint, Where, at_least, each, equal
+from multimodal_to.ocp.terms import Constraint, Where, at_least, between, each, equal
 from multimodal_to.scenarios.scenario import Start
 from multimodal_to.trajectory.quantities import XYZ
 
@@ -28,6 +30,7 @@ ON_GROUND = Sized(1e-5, "m")
 """Largest height of a contact point that stands: a sole has more corners than a plane needs."""
 _MIDDLE = Sized(0.5 * ON_GROUND.value, ON_GROUND.unit)
 """Height of the points that hold a sole, so that its other corners are in the middle of their range."""
+_BACK = Sized(-CREEP.value, CREEP.unit)
 _LINE = 1e-3
 """Points nearer to a line than this share of its length do not hold a body from turning about it [1]."""
 
@@ -192,8 +195,24 @@ def in_place(interval: Interval, parameters: Parameters) -> SX:
     For the points of a body, with their mean p̄: the mean of t·(p_i⁺ − p_i) and, of two points or more,
     n·Σ (p_i − p̄) × (p_i⁺ − p_i) / √Σ |p_i − p̄|².
     """
+    return _moves(interval, parameters, stiff=False)
+
+
+def nearly_in_place(interval: Interval, parameters: Parameters) -> SX:
+    """As far as `in_place` says, of bodies on stiff legs: `models.stiff_legs`."""
+    return _moves(interval, parameters, stiff=True)
+
+
+def _standing(parameters: Parameters, *, stiff: bool) -> list[tuple[list[int], Flags]]:
+    """Return every set of points of one body that is given to be on, on stiff legs or on others, and over what."""
+    on_stiff = on_stiff_legs(parameters.robot)
+    bodies = _bodies(parameters, parameters.contacts.on)
+    return [(members, here) for members, here in bodies if on_stiff[members[0]] == stiff]
+
+
+def _moves(interval: Interval, parameters: Parameters, *, stiff: bool) -> SX:
     rows = list[SX]()
-    for members, _ in _bodies(parameters, parameters.contacts.on):
+    for members, _ in _standing(parameters, stiff=stiff):
         before = [interval.start.points[index] for index in members]
         after = [interval.end.points[index] for index in members]
         moves = [one - other for one, other in zip(after, before, strict=True)]
@@ -214,18 +233,14 @@ def _spread(parameters: Parameters, members: list[int]) -> float:
     return float(np.linalg.norm(places - places.mean(axis=0)))
 
 
-def _in_place(parameters: Parameters) -> Flags:
-    rows = [
-        here
-        for members, here in _bodies(parameters, parameters.contacts.on)
-        for _ in range(3 if len(members) > 1 else 2)
-    ]
+def _in_place(parameters: Parameters, *, stiff: bool) -> Flags:
+    rows = [here for members, here in _standing(parameters, stiff=stiff) for _ in range(3 if len(members) > 1 else 2)]
     return np.array(rows, dtype=bool).reshape(-1, parameters.scenario.knots + 1)
 
 
-def _in_place_labels(parameters: Parameters) -> tuple[str, ...]:
+def _in_place_labels(parameters: Parameters, *, stiff: bool) -> tuple[str, ...]:
     names, labels = parameters.robot.contact_names, list[str]()
-    for members, _ in _bodies(parameters, parameters.contacts.on):
+    for members, _ in _standing(parameters, stiff=stiff):
         body = ", ".join(names[index] for index in members)
         labels += [f"{body} {axis}" for axis in (("x", "y", "turn") if len(members) > 1 else ("x", "y"))]
     return tuple(labels)
@@ -265,9 +280,17 @@ GIVEN_IN_PLACE = Constraint(
     within=equal(),
     unit="m",
     holds=Where.EVERY_INTERVAL,
-    labels=_in_place_labels,
+    labels=partial(_in_place_labels, stiff=False),
     when=_gives,
-    present=_in_place,
+    present=partial(_in_place, stiff=False),
+)
+GIVEN_NEARLY_IN_PLACE = replace(
+    GIVEN_IN_PLACE,
+    name="given_nearly_in_place",
+    value=nearly_in_place,
+    within=between(_BACK, CREEP),
+    labels=partial(_in_place_labels, stiff=True),
+    present=partial(_in_place, stiff=True),
 )
 CLEARANCE = Constraint(
     value=clearance,
@@ -277,5 +300,5 @@ CLEARANCE = Constraint(
     when=_gives,
     present=_asked_clearance,
 )
-CONSTRAINTS = (GIVEN_OFF, GIVEN_ON, GIVEN_ON_SINCE_START, GIVEN_IN_PLACE, CLEARANCE)
+CONSTRAINTS = (GIVEN_OFF, GIVEN_ON, GIVEN_ON_SINCE_START, GIVEN_IN_PLACE, GIVEN_NEARLY_IN_PLACE, CLEARANCE)
 """What contacts that a scenario gives ask for; without any there are none of their rows."""
