@@ -24,7 +24,7 @@ def test_a_leg_is_stiff_where_its_foot_takes_more_than_its_joints_give(tmp_path,
     assert not on_stiff_legs(mt.load_robot("solo12")).any()  # three joints to a point
     assert not on_stiff_legs(ironcub).any()  # six joints to a sole
     assert not on_stiff_legs(hopper(tmp_path / "hopper")).any()  # its feet are on the base
-    assert not on_stiff_legs(one_leg(tmp_path / "leg")).any()
+    assert not on_stiff_legs(one_leg(tmp_path)).any()
 
 
 def test_solo_with_eight_joints_steps_and_its_feet_stay_where_they_are(solo8):
