@@ -33,13 +33,19 @@ _MIDDLE = Sized(0.5 * ON_GROUND.value, ON_GROUND.unit)
 _BACK = Sized(-CREEP.value, CREEP.unit)
 _LINE = 1e-3
 """Points nearer to a line than this share of its length do not hold a body from turning about it [1]."""
+_PLANE = 3
+"""Points that hold a plane."""
 
 # -------------------------------------------------------------------- which rows there are
 
 
 def not_held(parameters: Parameters) -> Flags:
-    """Return at which knots the height of a point is not given."""
-    return ~held(parameters)
+    """Return at which knots the height of a point is not given, nor follows from those that stand since the start."""
+    known, since_start = held(parameters), _since_start(parameters)
+    for members, here in _bodies(parameters, parameters.contacts.stands):
+        if len(_supports(parameters, members)) == _PLANE:
+            known[members] |= here & since_start[members].all(axis=0)
+    return ~known
 
 
 def held(parameters: Parameters) -> Flags:
@@ -86,10 +92,14 @@ def _supports(parameters: Parameters, members: list[int]) -> list[int]:
     return [members[index] for index in chosen]
 
 
-def _held_since_start(parameters: Parameters) -> Flags:
+def _since_start(parameters: Parameters) -> Flags:
     """Return at which knots a point has the height that it started with: it has stood ever since."""
     stands = np.logical_and.accumulate(parameters.contacts.stands, axis=1)
-    return held(parameters) & stands & (parameters.scenario.start is Start.STANDING)
+    return np.asarray(stands & (parameters.scenario.start is Start.STANDING))
+
+
+def _held_since_start(parameters: Parameters) -> Flags:
+    return held(parameters) & _since_start(parameters)
 
 
 def _held_anew(parameters: Parameters) -> Flags:
