@@ -17,7 +17,7 @@ print("physically true:", mt.audit(robot, trajectory).holds)
 for begin, end in flight_phases(robot, trajectory):
     print(f"in the air from {begin:.2f} to {end:.2f} s")
 heights = trajectory.com_position[2]
-print(f"CoM: crouches to {heights.min():.2f} m, rises to {heights[50:67].max():.2f} m, stands at {heights[-1]:.2f} m")
+print(f"CoM: crouches to {heights.min():.2f} m, rises to {heights[55:74].max():.2f} m, stands at {heights[-1]:.2f} m")
 hardest = largest_torques(robot, trajectory)[0]
 print(f"hardest motor: {hardest.joint}, {hardest.over_effort:.0%} of its limit")
 print("MuJoCo: it", tracking(play(robot, trajectory)).end)

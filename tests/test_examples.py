@@ -43,7 +43,7 @@ def it_lands_on_the_box(printed, trajectory):
     """Heels that land on the edge of the box slip off it in MuJoCo, so they are asked to land beyond it."""
     assert "MuJoCo: it stands" in printed
     heels = [row for row, name in enumerate(trajectory.contact_names) if name[-1] in "34"]
-    landed = trajectory.per_contact("contact_positions")[heels, :, 66:]
+    landed = trajectory.per_contact("contact_positions")[heels, :, 73:]
     assert landed[:, 0].max() < -0.16 + 1e-5
     assert landed[:, 2] == pytest.approx(np.full(landed[:, 2].shape, 0.1), abs=1e-4)
 
@@ -64,8 +64,11 @@ ALSO = {
 }
 """What else an example shows; in the same test, since another would wait until the example has run."""
 
+LONG = ("18_jump_onto_box",)
+"""Examples that are at the edge of what motors can: after a small change they may take many times as long."""
 
-@pytest.mark.parametrize("name", NAMES)
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.robots] * (name in LONG)) for name in NAMES])
 def test_every_example_runs(name, run_example):
     printed, trajectory = run_example(name)
     assert "optimal after" in printed
