@@ -44,6 +44,7 @@ def _icub() -> Path:
 ROTORS = tuple(f"iris__rotor_{index}" for index in range(4))
 URDFS: Mapping[str, str] = {
     "solo12": "solo_description/robots/solo12.urdf",
+    "solo8": "solo_description/robots/solo.urdf",
     "anymal": "anymal_b_simple_description/robots/anymal.urdf",
     "talos": "talos_data/robots/talos_reduced.urdf",
     "icub": "",
