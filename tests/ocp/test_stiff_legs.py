@@ -8,6 +8,7 @@ import pytest
 import multimodal_to as mt
 from hopper import hopper
 from multimodal_to.models.stiff_legs import CREEP, on_stiff_legs
+from multimodal_to.tasks.leaping import leap_height
 from one_leg import one_leg
 from places import example_robots
 
@@ -36,3 +37,13 @@ def test_solo_with_eight_joints_steps_and_its_feet_stay_where_they_are(solo8):
     points = solution.trajectory.per_contact("contact_positions")
     creep = np.abs(np.diff(points[:, :2], axis=2)).max(axis=1)[on]
     assert creep.max() < 1.1 * CREEP.of(solo8.units)
+
+
+def test_solo_with_eight_joints_jumps_as_high_as_with_twelve(solo8):
+    """Straight up, without any turn or way aside, its legs cannot throw it at all; nearly so they can."""
+    assert leap_height(solo8) == pytest.approx(leap_height(mt.load_robot("solo12")), rel=0.1)
+    problem = mt.build(solo8, mt.tasks.jump(solo8))
+    motion = mt.solve(problem, mt.Ipopt(max_iterations=200)).trajectory
+    report = mt.audit(problem.robot, motion)
+    assert report.holds
+    assert report.airborne > 0.1

@@ -18,6 +18,8 @@ LOWER = 2
 """At which of these depths the legs are at lift-off: arms and trunk that go up lift the CoM to where home has it."""
 STRONGEST = 3.0
 """A push is counted up to this [m g]: legs that are almost straight could bear more, for a moment."""
+_SLOW, _ASIDE = 1e-6, 0.1
+"""Less than this is no speed [m/s], and how much of the way up a way aside or a turn may be [1]."""
 _STEPS, _LONGEST, _DONE, _DAMPING, _OFF = 50, 0.2, 1e-7, 1e-8, 1e-3  # of the search for a crouch; _OFF in L
 
 
@@ -98,6 +100,9 @@ def _lowered(robot: Robot, looked_at: _Looked, start: Array, depth: float) -> Ar
 def _fastest(robot: Robot, looked_at: _Looked, joints: Array) -> float:
     """Return how fast the CoM can go straight up while the feet stand [m/s].
 
+    Legs with too few joints may not let it go straight up without any turn or way aside. There both may be a tenth of
+    the way up, of the angular momentum by L.
+
     Args:
         robot: whose joints have greatest speeds.
         looked_at: what is known of a posture.
@@ -108,7 +113,16 @@ def _fastest(robot: Robot, looked_at: _Looked, joints: Array) -> float:
     upward[len(jacobian) + 2] = -robot.mass
     rows = np.hstack([np.vstack([jacobian, momentum]), upward])
     most = np.concatenate([np.full(6, np.inf), robot.joint_limits.speed, [np.inf]])
-    return _most(rows, np.zeros(len(rows)), np.zeros(len(rows)), -most, most)
+    exactly = np.zeros(len(rows))
+    if (straight := _most(rows, exactly, exactly, -most, most)) > _SLOW:
+        return straight
+    aside = np.delete(np.arange(len(rows)), len(jacobian) + 2)[len(jacobian) :]
+    share = _ASIDE * robot.mass * np.array([[1.0], [1.0], *[[robot.standing_height]] * 3])
+    below, above = (np.hstack([rows[aside, :-1], sign * share]) for sign in (-1.0, 1.0))
+    held = np.delete(rows, aside, axis=0)
+    lower = np.concatenate([np.zeros(len(held)), np.full(len(aside), -np.inf), np.zeros(len(aside))])
+    upper = np.concatenate([np.zeros(len(held) + len(aside)), np.full(len(aside), np.inf)])
+    return _most(np.vstack([held, below, above]), lower, upper, -most, most)
 
 
 def _strongest(robot: Robot, looked_at: _Looked, joints: Array) -> float:
