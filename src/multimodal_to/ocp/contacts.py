@@ -6,7 +6,6 @@ A force that is given to be zero is a bound, and so is the height of a point tha
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import casadi as cs
 import numpy as np
@@ -243,12 +242,28 @@ def _spread(parameters: Parameters, members: list[int]) -> float:
     return float(np.linalg.norm(places - places.mean(axis=0)))
 
 
-def _in_place(parameters: Parameters, *, stiff: bool) -> Flags:
+def _in_place(parameters: Parameters) -> Flags:
+    return _over(parameters, stiff=False)
+
+
+def _nearly_in_place(parameters: Parameters) -> Flags:
+    return _over(parameters, stiff=True)
+
+
+def _over(parameters: Parameters, *, stiff: bool) -> Flags:
     rows = [here for members, here in _standing(parameters, stiff=stiff) for _ in range(3 if len(members) > 1 else 2)]
     return np.array(rows, dtype=bool).reshape(-1, parameters.scenario.knots + 1)
 
 
-def _in_place_labels(parameters: Parameters, *, stiff: bool) -> tuple[str, ...]:
+def _in_place_labels(parameters: Parameters) -> tuple[str, ...]:
+    return _ways(parameters, stiff=False)
+
+
+def _nearly_in_place_labels(parameters: Parameters) -> tuple[str, ...]:
+    return _ways(parameters, stiff=True)
+
+
+def _ways(parameters: Parameters, *, stiff: bool) -> tuple[str, ...]:
     names, labels = parameters.robot.contact_names, list[str]()
     for members, _ in _standing(parameters, stiff=stiff):
         body = ", ".join(names[index] for index in members)
@@ -290,17 +305,17 @@ GIVEN_IN_PLACE = Constraint(
     within=equal(),
     unit="m",
     holds=Where.EVERY_INTERVAL,
-    labels=partial(_in_place_labels, stiff=False),
+    labels=_in_place_labels,
     when=_gives,
-    present=partial(_in_place, stiff=False),
+    present=_in_place,
 )
 GIVEN_NEARLY_IN_PLACE = replace(
     GIVEN_IN_PLACE,
     name="given_nearly_in_place",
     value=nearly_in_place,
     within=between(_BACK, CREEP),
-    labels=partial(_in_place_labels, stiff=True),
-    present=partial(_in_place, stiff=True),
+    labels=_nearly_in_place_labels,
+    present=_nearly_in_place,
 )
 CLEARANCE = Constraint(
     value=clearance,
