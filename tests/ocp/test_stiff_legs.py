@@ -28,8 +28,8 @@ def test_a_leg_is_stiff_where_its_foot_takes_more_than_its_joints_give(tmp_path,
     assert not on_stiff_legs(one_leg(tmp_path)).any()
 
 
-def test_solo_with_eight_joints_steps_and_its_feet_stay_where_they_are(solo8):
-    problem = mt.build(solo8, mt.tasks.step(solo8))
+def test_solo_with_eight_joints_walks_and_its_feet_stay_where_they_are(solo8):
+    problem = mt.build(solo8, mt.tasks.walk(solo8))
     solution = mt.solve(problem, mt.Ipopt(max_iterations=200))
     assert solution.status is mt.Status.OPTIMAL
     assert mt.audit(problem.robot, solution.trajectory).holds
