@@ -13,7 +13,7 @@ import numpy as np
 from multimodal_to.adam.spatial import SX
 from multimodal_to.models.contact import FACES
 from multimodal_to.models.sole import soles
-from multimodal_to.models.stiff_legs import CREEP, on_stiff_legs
+from multimodal_to.models.stiff_legs import CREEP, on_stiff_legs, supports
 from multimodal_to.models.units import Sized
 from multimodal_to.ocp import constraints
 from multimodal_to.ocp.guess import contact_positions
@@ -30,8 +30,6 @@ ON_GROUND = Sized(1e-5, "m")
 _MIDDLE = Sized(0.5 * ON_GROUND.value, ON_GROUND.unit)
 """Height of the points that hold a sole, so that its other corners are in the middle of their range."""
 _BACK = Sized(-CREEP.value, CREEP.unit)
-_LINE = 1e-3
-"""Points nearer to a line than this share of its length do not hold a body from turning about it [1]."""
 _PLANE = 3
 """Points that hold a plane."""
 
@@ -42,7 +40,7 @@ def not_held(parameters: Parameters) -> Flags:
     """Return at which knots the height of a point is not given, nor follows from those that stand since the start."""
     known, since_start = held(parameters), _since_start(parameters)
     for members, here in _bodies(parameters, parameters.contacts.stands):
-        if len(_supports(parameters, members)) == _PLANE:
+        if len(supports(parameters.robot, members)) == _PLANE:
             known[members] |= here & since_start[members].all(axis=0)
     return ~known
 
@@ -54,7 +52,7 @@ def held(parameters: Parameters) -> Flags:
     """
     flags = np.zeros_like(parameters.contacts.stands)
     for members, here in _bodies(parameters, parameters.contacts.stands):
-        flags[_supports(parameters, members)] |= here
+        flags[supports(parameters.robot, members)] |= here
     return flags
 
 
@@ -73,22 +71,6 @@ def _bodies(parameters: Parameters, flags: Flags) -> list[tuple[list[int], Flags
             if some.any():
                 found.append((members[some].tolist(), (flags[members] == some[:, None]).all(axis=0)))
     return found
-
-
-def _supports(parameters: Parameters, members: list[int]) -> list[int]:
-    """Return up to three of the points of a body that are far from each other and not on one line."""
-    robot = parameters.robot
-    frames = [robot.kindyn.tree.frame(robot.contact_names[index]) for index in members]
-    places = np.array([np.array(cs.DM(frame.translation)).ravel() for frame in frames])
-    away = np.linalg.norm(places - places[0], axis=1)
-    second = int(away.argmax())
-    if not away[second]:
-        return members[:1]
-    along = (places[second] - places[0]) / away[second]
-    off = np.linalg.norm(np.cross(places - places[0], along), axis=1)
-    third = int(off.argmax())
-    chosen = [0, second, third] if off[third] > _LINE * away[second] else [0, second]
-    return [members[index] for index in chosen]
 
 
 def _since_start(parameters: Parameters) -> Flags:

@@ -49,9 +49,9 @@ def numbers(name: str) -> Mapping[str, Any]:
 
 def is_starter(name: str, robot: str) -> bool:
     """Return whether a name is a starter task for the robot of a name."""
-    if name not in TASKS or name not in SCENARIOS:
-        return name in TASKS
-    return robot not in BUNDLED_FOR or (robot != BUNDLED_FOR[0] and name in NOT_SIZED)
+    of_others = NOT_SIZED if robot in BUNDLED_FOR[1:] else ()
+    is_bundled = name in SCENARIOS and robot in BUNDLED_FOR and name not in of_others
+    return name in TASKS and not is_bundled
 
 
 def follows_from(name: str, robot: str) -> bool:
