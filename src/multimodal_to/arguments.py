@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import os
 import types
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
@@ -122,6 +123,21 @@ def vector(
     if np.isnan(array).any() or (finite and not np.isfinite(array).all()):
         raise error(f"{what} is {shown(array.tolist())}; expected {'finite ' * finite}numbers")
     return array
+
+
+def refuse_negative(what: str, number: float, error: type[MultimodalError] = InputError) -> None:
+    """Refuse a number that is below zero, not finite, or none.
+
+    Args:
+        what: the number is called.
+        number: that is looked at.
+        error: what is raised.
+
+    Raises:
+        MultimodalError: of the kind of `error`; it is one of these.
+    """
+    if not 0.0 <= number < math.inf:
+        raise error(f"{what} is {shown(number)}; expected a number of at least zero")
 
 
 @cache

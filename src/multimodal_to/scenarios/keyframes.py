@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from multimodal_to.adam.spatial import Array
-from multimodal_to.arguments import check_fields, checked
+from multimodal_to.arguments import check_fields, checked, refuse_negative
 from multimodal_to.errors import InputError, ScenarioError, shown, unknown
 from multimodal_to.models import attitude
 from multimodal_to.models.robot import Robot
@@ -49,7 +49,7 @@ class FrameTarget:
         _keep_axes(self, "position")
         _keep_quaternion(self, "orientation")
         for name in ("position_tolerance", "orientation_tolerance"):
-            _refuse_negative(name, getattr(self, name))
+            refuse_negative(name, getattr(self, name))
         if self.position is None and self.orientation is None:
             raise InputError("nothing is asked of the frame; expected 'position' or 'orientation'")
 
@@ -135,7 +135,7 @@ class Keyframe:
         if self.yaw is not None and not -math.pi <= self.yaw <= math.pi:
             raise InputError(f"yaw is {self.yaw} rad; expected a number from −π to π")
         for name in ("orientation_tolerance", "joint_tolerance"):
-            _refuse_negative(name, getattr(self, name))
+            refuse_negative(name, getattr(self, name))
         self._check_together()
 
     # ---------------------------------------------------------------- what is asked
@@ -395,11 +395,6 @@ def _refuse_other_axes(name: str, value: Mapping[str, float]) -> None:
 def _refuse_not_finite(name: str, *numbers: float) -> None:
     if not all(math.isfinite(number) for number in numbers):
         raise InputError(f"{name} is {shown(list(numbers))}; expected finite numbers")
-
-
-def _refuse_negative(name: str, number: float) -> None:
-    if not 0.0 <= number < math.inf:
-        raise InputError(f"{name} is {number}; expected a number of at least zero")
 
 
 def asked_of(keyframe: Keyframe) -> tuple[str, ...]:

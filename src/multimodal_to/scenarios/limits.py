@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from multimodal_to.arguments import check_fields
-from multimodal_to.errors import ScenarioError, shown, unknown
+from multimodal_to.arguments import check_fields, refuse_negative
+from multimodal_to.errors import ScenarioError, unknown
 from multimodal_to.models.robot import Robot
 from multimodal_to.trajectory.instants import Instant, check_stretch, knot_at
 from multimodal_to.trajectory.quantities import XYZ
@@ -46,8 +45,7 @@ class Limits:
         asked |= {f"thrusts.{name}": value for name, value in self.thrusts.items()}
         found = {name: value for name, value in asked.items() if value is not None}
         for name, value in found.items():
-            if not 0.0 <= value < math.inf:
-                raise ScenarioError(f"limits: {name} is {shown(value)}; expected a number of at least zero")
+            refuse_negative(f"limits: {name}", value, ScenarioError)
         if not found:
             raise ScenarioError("limits: nothing is limited; expected base_speed, turning_speed, joint_speeds, thrusts")
 

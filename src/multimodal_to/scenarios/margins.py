@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 
-from multimodal_to.arguments import check_fields
+from multimodal_to.arguments import check_fields, refuse_negative
 from multimodal_to.errors import ScenarioError
 
 
@@ -30,9 +29,7 @@ class Margins:
     def __post_init__(self) -> None:
         check_fields(self, ScenarioError, "margin ")
         for entry in fields(self):
-            number = getattr(self, entry.name)
-            if not (math.isfinite(number) and number >= 0):
-                raise ScenarioError(f"margin '{entry.name}' is {number}; expected a number of at least zero")
+            refuse_negative(f"margin '{entry.name}'", getattr(self, entry.name), ScenarioError)
 
     @classmethod
     def none(cls) -> Margins:

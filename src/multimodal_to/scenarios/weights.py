@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
-from multimodal_to.arguments import check_fields
+from multimodal_to.arguments import check_fields, refuse_negative
 from multimodal_to.errors import ScenarioError
 from multimodal_to.values import FrozenMapping
 
@@ -72,6 +71,5 @@ class Weights:
         for entry in fields(self):
             value = getattr(self, entry.name)
             for number in value.values() if isinstance(value, Mapping) else (value,):
-                if not (math.isfinite(number) and number >= 0):
-                    raise ScenarioError(f"weight '{entry.name}' is {number}; expected a number of at least zero")
+                refuse_negative(f"weight '{entry.name}'", number, ScenarioError)
         object.__setattr__(self, "joint_velocities", FrozenMapping(self.joint_velocities))
